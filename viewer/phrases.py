@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 _BYTES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
@@ -25,10 +25,10 @@ _is_data = ContextVar("is_data", default=False)
 class Shown(str):
     """Text of a value in a sentence."""
 
-    value: Any
+    value: object
     """The value as data, or ``NO_VALUE``."""
 
-    def __new__(cls, text: str, value: Any = NO_VALUE) -> Shown:
+    def __new__(cls, text: str, value: object = NO_VALUE) -> Shown:
         """Return the text of a value."""
         shown = super().__new__(cls, text)
         shown.value = value
@@ -147,7 +147,7 @@ def agree(count: int, one: str, many: str) -> Shown:
     return Shown(one if count == 1 else many)
 
 
-def optional(pattern: str, value: Any) -> Shown:
+def optional(pattern: str, value: object) -> Shown:
     """Return ``pattern.format(value)``, or nothing without a value.
 
     >>> optional(" at {}", "row 3"), optional(" at {}", "")

@@ -10,12 +10,11 @@ import traceback
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.diagnostics import described
-from viewer.diagnostics.record import Record, recorded
+from viewer.diagnostics.record import JsonObject, Record, recorded
 from viewer.errors import ViewerError
 from viewer.interrupts import watched
 from viewer.phrases import printable
@@ -28,7 +27,7 @@ _LONGEST = 2000  # maximum length of a message in characters
 class FunctionJob:
     """A plain function as a job."""
 
-    function: Callable[[Item], Any]
+    function: Callable[[Item], object]
     """Called with an ``Item``; must be importable by its name if items run in other processes. A
     dict that it returns is the ``values`` of the result, anything else ``values["value"]``. The
     folder of the item's output exists; if it writes the output, that is listed in the result."""
@@ -42,7 +41,7 @@ class FunctionJob:
             result = replace(result, outputs=(*result.outputs, item.output))
         return result
 
-    def _values(self, item: Item) -> dict[str, Any]:
+    def _values(self, item: Item) -> JsonObject:
         if item.output:
             Path(item.output).parent.mkdir(parents=True, exist_ok=True)
         returned = self.function(item)
@@ -51,7 +50,7 @@ class FunctionJob:
         return {} if returned is None else {"value": returned}
 
 
-def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
+def attempt(item: Item, call: Callable[[Item], object]) -> Result:
     """Run one item; a failure becomes a result, and only a signal is raised.
 
     An int that ``call`` returns is the exit code, where 0 and 1 stand for success; a dict is the
@@ -77,7 +76,7 @@ def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     )
 
 
-def _outcome(item: Item, call: Callable[[Item], Any], record: Record) -> Result:
+def _outcome(item: Item, call: Callable[[Item], object], record: Record) -> Result:
     try:
         returned = call(item)
     except ViewerError as problem:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Any, Literal
+from typing import Literal
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics.record import JsonObject
 
 Status = Literal["done", "failed", "timeout", "crashed", "memory", "cancelled", "unchanged"]
 
@@ -42,13 +43,13 @@ class Result:
     """1, or more if the item was retried."""
     message: str = ""
     """The error in one line; empty if there is none."""
-    diagnostics: list[dict[str, Any]] = field(default_factory=list)
+    diagnostics: list[JsonObject] = field(default_factory=list)
     """Warnings and losses, as ``lint --json`` writes them."""
     outputs: tuple[str, ...] = ()
     """Files and folders written."""
     text: str = ""
     """The text that the job's command printed."""
-    values: dict[str, Any] = field(default_factory=dict)
+    values: JsonObject = field(default_factory=dict)
     """Data of the job for tables: distances of ``diff``, findings of ``lint``."""
     key: str = ""
     """Hash of the inputs, the options and the program's version, by which ``--resume`` recognises

@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from viewer.batching.items import Result
 from viewer.batching.tables import (
@@ -24,6 +24,7 @@ from viewer.batching.tables import (
     worst_measure,
 )
 from viewer.data_classes import dataclass
+from viewer.diagnostics.record import JsonObject
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.media.saving import all_or_none, save_text
 from viewer.phrases import counted, printable
@@ -139,7 +140,7 @@ def _save_page(path: Path, job: str, results: Sequence[Result]) -> list[str]:
     return [f"{printable(path, 300)}: overview of {counted(len(rows), 'item')}{more}"]
 
 
-def _badness(result: Result) -> tuple[Any, ...]:
+def _badness(result: Result) -> tuple[float | str, ...]:
     """Return a sort key, the worst first: failures, findings by severity, distances."""
     counts = result.values.get("counts", {})
     worst = max((_relative(result, group) for group in MEASURES), default=0.0)
@@ -165,7 +166,9 @@ def _counts(results: Sequence[Result]) -> str:
         (str(count), status, "good" if status in _FINISHED else "error")
         for status, count in by_status.most_common()
     ]
-    findings = sum((Counter(result.values.get("counts", {})) for result in results), Counter())
+    findings: Counter[str] = Counter()
+    for result in results:
+        findings.update(result.values.get("counts", {}))
     parts += [(str(findings[kind]), f"{kind}s", kind) for kind in _SEVERITIES if findings[kind]]
     seconds = sum(result.seconds for result in results)
     parts.append((f"{seconds:.1f} s", "computing", ""))
@@ -180,7 +183,7 @@ def _codes(results: Iterable[Result]) -> list[str]:
     """Return the table of findings by code, the worst severity first."""
     n_findings: Counter[str] = Counter()
     n_items: Counter[str] = Counter()
-    known: dict[str, Any] = {}
+    known: JsonObject = {}
     for result in results:
         findings = result.values.get("findings", ())
         for finding in findings:

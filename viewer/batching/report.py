@@ -15,11 +15,11 @@ from collections.abc import Iterator
 from dataclasses import field, fields
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.diagnostics.diagnostic import plain
+from viewer.diagnostics.record import JsonObject
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable
 
@@ -186,7 +186,7 @@ def read_results(path: Path) -> list[Result]:
 def _result(line: str) -> Result | None:
     """Parse the result in a line; None if the line is incomplete or has values of other types."""
     try:
-        found: dict[str, Any] = json.loads(line)
+        found: JsonObject = json.loads(line)
         if not all(isinstance(found[name], kinds) for name, kinds in _KINDS.items()):
             return None
         item = Item(found["index"], tuple(found["files"]), found["output"], found["name"])

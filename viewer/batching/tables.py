@@ -7,11 +7,11 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from viewer.batching.items import Result
+from viewer.diagnostics.record import JsonObject
 from viewer.media.saving import save_bytes
 
 Cell = str | int | float | None
@@ -73,7 +73,7 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     return len(results)
 
 
-def _cells_in(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Cell]]:
+def _cells_in(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, Cell]]:
     """Yield the numbers and strings of a function's values; those of an inner dict as ``a.b``."""
     for name, value in values.items():
         if isinstance(value, np.generic | np.ndarray) and value.ndim == 0:
@@ -104,13 +104,13 @@ def row_message(result: Result) -> str:
     return "; ".join(filter(None, errors)) or result.message
 
 
-def comparisons(result: Result) -> list[Mapping[str, Any]]:
+def comparisons(result: Result) -> list[JsonObject]:
     """Return the comparisons of an item of ``diff``; none if it failed before."""
     found = result.values.get("comparisons")
     return found if isinstance(found, list) else []
 
 
-def worst_measure(result: Result, group: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
+def worst_measure(result: Result, group: str) -> tuple[JsonObject, JsonObject] | None:
     """Return a result's largest measure of a group of ``MEASURES`` relative to size; its actor."""
     pairs = [
         (measure, actor)
@@ -155,9 +155,7 @@ def mismatches_of(result: Result) -> list[str]:
     ]
 
 
-def _measure_cells(
-    group: str, found: tuple[Mapping[str, Any], Mapping[str, Any]] | None
-) -> list[Cell]:
+def _measure_cells(group: str, found: tuple[JsonObject, JsonObject] | None) -> list[Cell]:
     if found is None:
         return [None] * len(_measure_columns(group))
     measure, _ = found
@@ -200,7 +198,7 @@ def figures_of(result: Result) -> list[dict[str, Cell]]:
     return [dict(zip(_FIGURE, _figure_cells(actor, len(actors)), strict=True)) for actor in actors]
 
 
-def _figure_cells(actor: Mapping[str, Any], n_figures: int) -> list[Cell]:
+def _figure_cells(actor: JsonObject, n_figures: int) -> list[Cell]:
     clip, facts = actor.get("clip", {}), actor["model"].get("facts", {})
     start, end = clip.get("range", (None, None))
     skeleton, mesh = actor.get("skeleton", {}), actor.get("mesh", {})

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
+from viewer.diagnostics.record import JsonObject
 from viewer.errors import FormatError
 from viewer.phrases import counted, printable, rounded
 from viewer.rig.captures.points import PointClip
@@ -22,9 +22,9 @@ _MILLISECOND = 0.001
 _NO_NAME = "(no name)"
 
 
-def describe_clip(clip: Motion) -> dict[str, Any]:
+def describe_clip(clip: Motion) -> JsonObject:
     """Return the description of a motion as JSON data."""
-    facts: dict[str, Any] = {"name": clip.name, "range": [clip.start, clip.end]}
+    facts: JsonObject = {"name": clip.name, "range": [clip.start, clip.end]}
     if clip.kind == "curves":
         return facts | _describe_keys(clip)
     if clip.kind == "transforms":
@@ -33,7 +33,7 @@ def describe_clip(clip: Motion) -> dict[str, Any]:
     return facts | _describe_timing(clip.timing) | _describe_rows(clip)
 
 
-def _describe_keys(clip: Clip) -> dict[str, Any]:
+def _describe_keys(clip: Clip) -> JsonObject:
     times = [time for channel in clip.channels for time in channel.times.tolist()]
     modes = Counter(mode for channel in clip.channels for mode in channel.extrapolation)
     return {
@@ -44,7 +44,7 @@ def _describe_keys(clip: Clip) -> dict[str, Any]:
     }
 
 
-def _describe_transforms(clip: TransformClip) -> dict[str, Any]:
+def _describe_transforms(clip: TransformClip) -> JsonObject:
     ends = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
     return {
         "kind": "transforms",
@@ -62,7 +62,7 @@ def _counts(names: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(names).items()))
 
 
-def _describe_timing(timing: Timing) -> dict[str, Any]:
+def _describe_timing(timing: Timing) -> JsonObject:
     return {
         "frame_rate": timing.frame_rate,
         "frames": timing.n_frames,
@@ -72,7 +72,7 @@ def _describe_timing(timing: Timing) -> dict[str, Any]:
     }
 
 
-def _describe_rows(clip: SampledClip | PointClip) -> dict[str, Any]:
+def _describe_rows(clip: SampledClip | PointClip) -> JsonObject:
     if clip.points is not None:
         seen = clip.points[..., 3] > 0.0
         return {"points": clip.points.shape[1], "seen": float(seen.mean()) if seen.size else 0.0}
@@ -88,11 +88,11 @@ def gaps_of(timing: Timing) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in pairs]
 
 
-def describe_animations(actor: Actor) -> list[dict[str, Any]]:
+def describe_animations(actor: Actor) -> list[JsonObject]:
     """Return the names and ranges of a figure's animations as JSON data, without their keys."""
     # An animation with invalid keys has an "error". Keys whose place in the file is unknown take
     # long to read, and are checked by ``lint`` only.
-    found: list[dict[str, Any]] = [
+    found: list[JsonObject] = [
         {
             "number": index + 1,
             "name": animation.name,
@@ -110,7 +110,7 @@ def describe_animations(actor: Actor) -> list[dict[str, Any]]:
     return found
 
 
-def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
+def animation_lines(animations: list[JsonObject]) -> list[str]:
     """Return the list of animations as lines of text; an asterisk marks the one that plays."""
     width = len(str(len(animations)))
     lines = []
@@ -125,7 +125,7 @@ def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def clip_lines(clip: dict[str, Any]) -> list[str]:
+def clip_lines(clip: JsonObject) -> list[str]:
     """Return the description as lines of text."""
     start, end = clip["range"]
     name = printable(clip["name"]) or _NO_NAME
@@ -153,7 +153,7 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _rows_text(clip: dict[str, Any]) -> str:
+def _rows_text(clip: JsonObject) -> str:
     frames, first = str(counted(clip["frames"], "frame")), clip["first_frame"]
     if first:
         last = first + clip["frames"] - 1
@@ -173,7 +173,7 @@ def _seconds(time: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _gap_lines(clip: dict[str, Any]) -> list[str]:
+def _gap_lines(clip: JsonObject) -> list[str]:
     missing = clip["frames"] - clip["present_frames"]
     if not missing:
         return []

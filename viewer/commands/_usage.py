@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from viewer.commands import COMMANDS
 from viewer.errors import ViewerError
@@ -70,7 +70,7 @@ class Parser(argparse.ArgumentParser):
             near = question([bare[one] for one in near_names(name.lstrip("-"), bare)])
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
+    def _check_value(self, action: argparse.Action, value: object) -> None:
         """Raise for a value that is not one of an option's choices; suggest the nearest."""
         from viewer.near_names import did_you_mean
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from viewer.commands._scene import add_scene_arguments, open_scene, scene_option
 from viewer.commands._settings import settings_of, stated
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
-from viewer.diagnostics.record import note_values
+from viewer.diagnostics.record import JsonObject, note_values
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size, flat_triangles
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
+def describe(scene: Scene, skinning: Skinning | None = None) -> JsonObject:
     """Return the contents of a scene as JSON data; lengths in figure units, angles in radians."""
     how = skinning or Skinning()
     return {
@@ -91,12 +91,12 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
     }
 
 
-def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
+def _describe_actor(actor: Actor, up: str) -> JsonObject:
     """Return the description of an actor; its box is in world space, with up axis ``up``."""
     figure = actor.figure
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
     box = bounding_box(points) if len(points) else None
-    parts: dict[str, Any] = {"name": actor.name, "up": up, "present": actor.is_present}
+    parts: JsonObject = {"name": actor.name, "up": up, "present": actor.is_present}
     parts["figure"] = figure.name
     parts |= {"box": None if box is None else box.tolist()}
     parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
@@ -115,12 +115,12 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
     return parts | _describe_motions(actor)
 
 
-def _describe_motions(actor: Actor) -> dict[str, Any]:
+def _describe_motions(actor: Actor) -> JsonObject:
     if actor.clip is None and not actor.figure.animations:
         return {}
     from viewer.commands._info_clips import describe_animations, describe_clip
 
-    parts: dict[str, Any] = {}
+    parts: JsonObject = {}
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
         space = actor.shape_space
@@ -130,7 +130,7 @@ def _describe_motions(actor: Actor) -> dict[str, Any]:
     return parts
 
 
-def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> dict[str, Any]:
+def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> JsonObject:
     labels, shown = joint_labels(skeleton), shown_joints(skeleton).tolist()
     names, parents = skeleton.names, shown_parents(skeleton)
     limits = skeleton.dof_limits
@@ -167,7 +167,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
+def _describe_mesh(mesh: Mesh) -> JsonObject:
     lengths = np.linalg.norm(mesh.normals, axis=1)
     return {
         "vertices": mesh.n_vertices,
@@ -190,7 +190,7 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
     }
 
 
-def _describe_parts(mesh: Mesh) -> list[dict[str, Any]]:
+def _describe_parts(mesh: Mesh) -> list[JsonObject]:
     """Return the parts that can be hidden, with their numbers of triangles."""
     # Triangles without a part are counted first.
     counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
@@ -200,7 +200,7 @@ def _describe_parts(mesh: Mesh) -> list[dict[str, Any]]:
     ]
 
 
-def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
+def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> JsonObject:
     from viewer.rig.skin import has_influence, idle_joints, influence_counts, weight_sums
 
     counts = influence_counts(skin)
@@ -221,7 +221,7 @@ def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
     }
 
 
-def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
+def _describe_morphs(shapes: BlendShapes) -> list[JsonObject]:
     """Return the morph targets with the numbers of vertices and materials that each changes."""
     from viewer.rig.morph_target import MORPH_GROUP
 
@@ -235,12 +235,12 @@ def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
     ]
 
 
-def _morph_line(morph: dict[str, Any]) -> str:
+def _morph_line(morph: JsonObject) -> str:
     changes = f", changes {counted(morph['materials'], 'material')}" if morph["materials"] else ""
     return f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}{changes}"
 
 
-def _lines(actor: dict[str, Any]) -> list[str]:
+def _lines(actor: JsonObject) -> list[str]:
     lines = [f"{printable(actor['name'])}", f"  box        {_box_text(actor)}, {actor['up']} up"]
     if actor["figure"] not in actor["name"]:
         lines.append(f"  figure     {printable(actor['figure'])}")
@@ -254,7 +254,7 @@ def _lines(actor: dict[str, Any]) -> list[str]:
     return lines + _motion_lines(actor)
 
 
-def _motion_lines(actor: dict[str, Any]) -> list[str]:
+def _motion_lines(actor: JsonObject) -> list[str]:
     lines: list[str] = []
     if "clip" in actor:
         from viewer.commands._info_clips import clip_lines
@@ -267,7 +267,7 @@ def _motion_lines(actor: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _box_text(actor: dict[str, Any]) -> str:
+def _box_text(actor: JsonObject) -> str:
     if actor["box"] is None:
         return "none: nothing is visible" if actor["present"] else "none: absent at this time"
     low, high = actor["box"]
@@ -283,7 +283,7 @@ def _vertices(count: int) -> str:
     return counted(count, "vertex")
 
 
-def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
+def _skeleton_lines(skeleton: JsonObject) -> list[str]:
     table = skeleton["dof_table"]
     lines = [
         f"  skeleton   {counted(skeleton['joints'], 'joint')}, {counted(skeleton['dofs'], 'DOF')} "
@@ -300,11 +300,11 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _is_free(dof: dict[str, Any]) -> bool:
+def _is_free(dof: JsonObject) -> bool:
     return dof["minimum"] is None and dof["maximum"] is None
 
 
-def _dof_line(dof: dict[str, Any]) -> str:
+def _dof_line(dof: JsonObject) -> str:
     low, high = dof["minimum"], dof["maximum"]
     limits = "unlimited" if low is None and high is None else f"{_bound(low)} to {_bound(high)}"
     if low is not None and low == high:
@@ -316,7 +316,7 @@ def _bound(value: float | None) -> str:
     return "unlimited" if value is None else number_text(value, ".6g")
 
 
-def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
+def _mesh_lines(mesh: JsonObject) -> list[str]:
     lines = [
         f"  mesh       {counted(mesh['vertices'], 'vertex')}, "
         f"{counted(mesh['triangles'], 'triangle')} "
@@ -338,7 +338,7 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _skin_lines(skin: dict[str, Any]) -> list[str]:
+def _skin_lines(skin: JsonObject) -> list[str]:
     histogram = "  ".join(f"{k}: {n}" for k, n in skin["influence_histogram"].items())
     sums = skin["weight_sums"]
     lines = [
@@ -369,11 +369,11 @@ def _point(values: list[float], finest: float) -> str:
     return f"({', '.join(number_text(row, '.10g') for row in rows)})"
 
 
-def _describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
+def _describe_model(actor: Actor, skinning: Skinning) -> JsonObject:
     """Return the properties of a shaped and posed body as JSON data; empty for a plain rig."""
     figure, pose = actor.figure, actor.pose
     facts = {heading: str(fact) for heading, fact in figure.facts}
-    model: dict[str, Any] = {"facts": facts} if facts else {}
+    model: JsonObject = {"facts": facts} if facts else {}
     if figure.blend_shapes is not None:
         shapes = figure.blend_shapes
         model["shapes"] = [
@@ -394,7 +394,7 @@ def _describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
     return model
 
 
-def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
+def _rest(figure: Figure, pose: Pose | None) -> JsonObject:
     from viewer.rig.inspection.measure import measure
     from viewer.rig.skinning import deform
 
@@ -412,7 +412,7 @@ def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
     return {"height": found.height, "volume": found.volume, "mass": found.mass}
 
 
-def _place(pose: Pose) -> dict[str, Any]:
+def _place(pose: Pose) -> JsonObject:
     return {
         "shape_weights": pose.shape_weights.tolist(),
         "figure_translation": pose.figure_translation.tolist(),
@@ -420,8 +420,8 @@ def _place(pose: Pose) -> dict[str, Any]:
     }
 
 
-def _annotations(figure: Figure) -> dict[str, Any]:
-    parts: dict[str, Any] = {}
+def _annotations(figure: Figure) -> JsonObject:
+    parts: JsonObject = {}
     if figure.body_parts is not None:
         names = figure.body_parts.names
         counts = np.bincount(figure.body_parts.of_vertex, minlength=len(names))
@@ -461,7 +461,7 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
     return {text: value for text, value in effects.items() if value > 0.0}
 
 
-def _model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
+def _model_lines(model: JsonObject, figure: Figure) -> list[str]:
     """Return the description as lines of text."""
     lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
     if "rest" in model:
@@ -502,11 +502,11 @@ def _length(figure: Figure, value: float) -> str:
     return length_text(figure, value)
 
 
-def _facts(model: dict[str, Any]) -> list[tuple[str, str]]:
+def _facts(model: JsonObject) -> list[tuple[str, str]]:
     return list(model.get("facts", {}).items())
 
 
-def _describe_surface(material: Material) -> dict[str, Any]:
+def _describe_surface(material: Material) -> JsonObject:
     """Return the properties of a material other than one opaque texture."""
     if material.is_plain:
         return {}
@@ -516,7 +516,7 @@ def _describe_surface(material: Material) -> dict[str, Any]:
         if name != "base_texture"
     }
     color = None if material.base_color is None else list(material.base_color)
-    surface: dict[str, Any] = {"base_color": color, "maps": maps, "alpha": material.alpha_mode}
+    surface: JsonObject = {"base_color": color, "maps": maps, "alpha": material.alpha_mode}
     if material.is_physical:
         surface |= {"metallic": material.metallic, "roughness": material.roughness}
     if material.shade_color is not None:
@@ -524,10 +524,10 @@ def _describe_surface(material: Material) -> dict[str, Any]:
     return surface
 
 
-def _describe_toon(material: Material) -> dict[str, Any]:
+def _describe_toon(material: Material) -> JsonObject:
     """Return the shade, rim light and outline of a toon material; None for what it lacks."""
     rim, outline = material.rim, material.outline
-    toon: dict[str, Any] = {
+    toon: JsonObject = {
         "shade_color": None if material.shade_color is None else list(material.shade_color),
         "shade_range": list(material.shade_range),
         "rim": None,
@@ -542,7 +542,7 @@ def _describe_toon(material: Material) -> dict[str, Any]:
     return toon
 
 
-def _surface_words(material: dict[str, Any]) -> list[str]:
+def _surface_words(material: JsonObject) -> list[str]:
     """Return the properties of ``_describe_surface`` other than one texture, as text."""
     if "maps" not in material:
         return []
@@ -557,7 +557,7 @@ def _surface_words(material: dict[str, Any]) -> list[str]:
     return words if material["alpha"] == "opaque" else [*words, f"alpha {material['alpha']}"]
 
 
-def _toon_words(toon: dict[str, Any]) -> list[str]:
+def _toon_words(toon: JsonObject) -> list[str]:
     words = [f"toon with shade colour {_numbers(toon['shade_color'])}"]
     rim, outline = toon["rim"], toon["outline"]
     if rim is not None:

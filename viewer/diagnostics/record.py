@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics.diagnostic import Diagnostic, described
@@ -15,12 +15,15 @@ from viewer.phrases import printable
 if TYPE_CHECKING:
     from viewer.diagnostics.codes import Severity
 
+JsonObject: TypeAlias = dict[str, Any]
+"""A description as JSON data: numbers, texts, lists and objects by name."""
+
 
 @dataclass
 class Record:
     """Data of a run that is not in its printed text."""
 
-    diagnostics: list[dict[str, Any]] = field(default_factory=list)
+    diagnostics: list[JsonObject] = field(default_factory=list)
     """Warnings and notes as returned by ``described``; entries that are only text have just
     ``severity`` and ``message``."""
     values: dict[str, object] = field(default_factory=dict)

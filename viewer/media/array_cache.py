@@ -14,6 +14,7 @@ cached.
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 import os
 import stat
@@ -119,7 +120,9 @@ class Slot:
                 os.utime(self.path)
         return values
 
-    def _read(self, stream: Any, size: int, kind: str, n_axes: int) -> NDArray[Any] | None:
+    def _read(
+        self, stream: io.FileIO, size: int, kind: str, n_axes: int
+    ) -> NDArray[Any] | None:
         """Return the array of an open entry, after verifying every byte."""
         header = stream.read(_HEADER.size)
         if len(header) < _HEADER.size:
@@ -140,7 +143,7 @@ class Slot:
             return None
         return values
 
-    def store(self, values: NDArray[Any]) -> None:
+    def store(self, values: NDArray[np.generic]) -> None:
         """Store float64 or uint8, at most three axes; failures are ignored: a cache is optional."""
         values = np.ascontiguousarray(values)
         total = _HEADER.size + len(self._content) + values.nbytes

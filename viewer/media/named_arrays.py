@@ -6,7 +6,7 @@ import io
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from viewer.progress import report_bytes
 _BLOCK = 1 << 22  # bytes that are compressed or written between reports of progress
 
 
-def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[np.generic]]) -> None:
     """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
     buffer = io.BytesIO()
     total = sum(array.nbytes for array in arrays.values())

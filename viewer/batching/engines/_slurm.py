@@ -30,7 +30,7 @@ _MOST_VAIN = 3  # consecutive jobs that end before their workers connect; then t
 
 
 def slurm_cluster(
-    name: ClusterName, memory: int | None, settings: Mapping[str, Any]
+    name: ClusterName, memory: int | None, settings: Mapping[str, object]
 ) -> SLURMCluster:
     """Return a cluster whose workers are SLURM jobs; none is submitted yet."""
     # The options that describe a job; all others are passed to sbatch.

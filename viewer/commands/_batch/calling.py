@@ -38,7 +38,7 @@ _OWN = ("files", "output", "force", *destinations(Request, without="to"), "table
 
 def batch(
     paths: _Paths,
-    job: str | Callable[[Item], Any],
+    job: str | Callable[[Item], object],
     out: str | os.PathLike[str] = "",
     *,
     to: str = "",
@@ -160,7 +160,7 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
     return found
 
 
-def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Request]:
+def _function(job: Callable[[Item], object], request: Request) -> tuple[Job, Request]:
     """Return a function as a job, and the request with its identity."""
     may_replace = request.force or request.resume
     table, overview = (
@@ -204,7 +204,7 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
     return command, replace(found, **{name: getattr(request, name) for name in names})
 
 
-def identity_of(function: Callable[..., Any]) -> str:
+def identity_of(function: Callable[..., object]) -> str:
     """Return a string that is the same in all processes, and changes if the function does."""
     # It covers code, defaults, bound arguments, variables of enclosing functions and the program's
     # version, but not the code of other functions that it calls.
@@ -256,7 +256,7 @@ def _is_set(cell: CellType) -> bool:
     return True
 
 
-def _pickled(value: Any) -> bytes:
+def _pickled(value: object) -> bytes:
     """Return a pickle, or the name of the type if pickling fails."""
     try:
         return pickle.dumps(_without_sets(value))
@@ -264,7 +264,7 @@ def _pickled(value: Any) -> bytes:
         return f"{type(value).__module__}.{type(value).__qualname__}".encode()
 
 
-def _without_sets(value: Any) -> Any:
+def _without_sets(value: Any) -> object:
     """Return data whose sets are sorted lists: their order varies between processes."""
     if isinstance(value, set | frozenset):
         return [type(value).__name__, *sorted(map(_pickled, value))]

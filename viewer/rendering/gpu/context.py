@@ -204,7 +204,7 @@ class OpenGLOffer:
     renderer: str
 
 
-def _headless_offer(options: Mapping[str, Any]) -> OpenGLOffer | None:
+def _headless_offer(options: Mapping[str, object]) -> OpenGLOffer | None:
     """Return the OpenGL version that moderngl's settings give without a window; None if none."""
     chosen = options.get("backend")
     create = glcontext.get_backend_by_name(chosen) if chosen else glcontext.default_backend()

@@ -6,7 +6,6 @@ A vertex has a range of influences in a list of (joint, weight) pairs, the stron
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -219,7 +218,7 @@ class MeshBuffers:
         """Number of pose correctives that are skipped together, see ``Correctives.block``."""
         return 1 if self.figure.correctives is None else self.figure.correctives.block
 
-    def summed(self, weights: NDArray[np.floating[Any]]) -> np.ndarray:
+    def summed(self, weights: NDArray[np.floating]) -> np.ndarray:
         """Return the sums of the pose correctives, (A, 3 V) float32, for weights (A, P)."""
         correctives = self.figure.correctives
         assert correctives is not None  # checked by the caller

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeAlias, TypeVar
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import RenderError
 from viewer.rendering.gpu.context import check_errors, is_software
 from viewer.rig.arrays import Bytes, Floats
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
+_Numbers: TypeAlias = NDArray[np.generic] | list[float]
 
 # Fixed texture widths, on which the shaders rely: every OpenGL 3.3 driver allows at least 1024.
 _MATRICES_PER_ROW = 256  # a matrix has three texels
@@ -22,7 +23,7 @@ _RIGID_PER_ROW = 128  # a joint has five texels
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 
 
-def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
+def buffer(context: moderngl.Context, values: ArrayLike, dtype: str) -> moderngl.Buffer:
     """Return a vertex or index buffer; one byte long if it is empty."""
     data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
     return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
@@ -92,7 +93,9 @@ def write_rigid(texture: moderngl.Texture, duals: Floats, stretches: Floats) -> 
     texture.write(rows.tobytes())
 
 
-def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moderngl.Texture:
+def pair_texture(
+    context: moderngl.Context, indices: _Numbers, weights: _Numbers
+) -> moderngl.Texture:
     """Return a texture of (index, weight) pairs, one texel each."""
     count = len(indices)
     height = _height(count, _PAIRS_PER_ROW)
@@ -101,7 +104,7 @@ def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moder
     return checked(context, texture, f"{count} influences")
 
 
-def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
+def write_pairs(texture: moderngl.Texture, indices: _Numbers, weights: _Numbers) -> None:
     """Upload (index, weight) pairs into a texture with room for all of them."""
     pairs = np.zeros((texture.width * texture.height, 2), "f4")
     # float32 represents every index below 2^24 exactly.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import moderngl
 
 from viewer.rendering.gpu.upload import checked, float32
 from viewer.rig.arrays import Floats
+
+Source: TypeAlias = tuple[Any, ...]
+"""A buffer, its layout in moderngl's notation, and the names of its attributes."""
 
 
 class VertexArrays:
@@ -21,7 +24,7 @@ class VertexArrays:
     def get(
         self,
         program: moderngl.Program,
-        content: Callable[[], Sequence[Any]],
+        content: Callable[[], Sequence[Source]],
         indices: moderngl.Buffer | None = None,
         key: tuple[object, ...] = (),
     ) -> moderngl.VertexArray:
@@ -43,9 +46,7 @@ class VertexArrays:
         self._arrays.clear()
 
 
-def _used(
-    program: moderngl.Program, source: moderngl.Buffer, layout: str, *names: str
-) -> tuple[Any, ...]:
+def _used(program: moderngl.Program, source: moderngl.Buffer, layout: str, *names: str) -> Source:
     """Return a source with the attributes of a program, and the bytes of all others skipped."""
     formats, per_instance = layout.removesuffix("/i").split(), layout.endswith("/i")
     for index, name in enumerate(names):

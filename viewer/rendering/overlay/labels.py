@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +82,7 @@ def lay_out(
     side = max(int(_CELL_SIDE * gap), math.ceil(math.sqrt(math.prod(picture) / n_cells)))
     dots, taken = Dots(Cells(picture, side), anchors[order]), _Taken(picture, gap)
     nothing = np.zeros(0, np.int32), np.zeros((0, 2), np.int32), np.zeros((0, 2)), np.zeros(0, bool)
-    placed: list[tuple[NDArray[Any], ...]] = [nothing]
+    placed: list[tuple[NDArray[np.generic], ...]] = [nothing]
     for start in range(0, len(order), _BATCH):
         some = order[start : start + _BATCH]
         places = label_places(anchors[some], sizes[some], picture, gap)
@@ -173,7 +172,7 @@ class LabelPlaces:
     has_line: Bools
     """(M,) bool. Whether the position requires a leader line."""
 
-    def take(self, rows: NDArray[np.integer[Any]]) -> LabelPlaces:
+    def take(self, rows: NDArray[np.integer]) -> LabelPlaces:
         """Return a selection of the positions."""
         return LabelPlaces(*(getattr(self, field.name)[rows] for field in fields(self)))
 

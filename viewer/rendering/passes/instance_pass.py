@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -29,7 +28,7 @@ from viewer.rendering.gpu.upload import (
     rigid_texture,
     write_stacked,
 )
-from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
@@ -303,7 +302,7 @@ class InstanceBuffers:
         listed = None if indices is None else indices.indices
         key = (id(listed), id(skin), id(self._rest.positions))
 
-        def content() -> list[Any]:
+        def content() -> list[Source]:
             own = self._instances, f"{_LAYOUT}/i", *_PER_INSTANCE
             return [*self._rest.attributes(skin), *mesh.attributes(), own]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -17,7 +16,7 @@ from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS, Surface
-from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
@@ -214,7 +213,7 @@ class MeshPass:
     ) -> moderngl.VertexArray:
         """Return the mesh's vertex array for a program, with the attributes that it uses."""
 
-        def content() -> list[Any]:
+        def content() -> list[Source]:
             found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal"), *mesh.mesh.attributes()]
             if mesh.scalars.values is not None:
                 found.append((mesh.scalars.values, "f4", "in_scalar"))
@@ -300,7 +299,7 @@ def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> 
 
 def _hull_uniforms(
     surface: Surface, outline: Outline, scale: float, textured: bool
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the uniforms of an outline; ``scale``: camera units per metre."""
     values, unit = surface.uniforms, SAMPLERS["u_occlusion_map"]
     has_map = textured and any(used == unit for used, _ in surface.textures)
