@@ -47,7 +47,12 @@ PARTS = {
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts", "media", "resources"},
-    "examples": {"batching", "models", "resources", "rig"},  # otherwise the names of ``viewer.__all__``
+    "examples": {
+        "batching",
+        "models",
+        "resources",
+        "rig",
+    },  # otherwise the names of ``viewer.__all__``
     "interrupts": set(),
     "resources": set(),
     "streams": set(),

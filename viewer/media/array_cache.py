@@ -120,9 +120,7 @@ class Slot:
                 os.utime(self.path)
         return values
 
-    def _read(
-        self, stream: io.FileIO, size: int, kind: str, n_axes: int
-    ) -> NDArray[Any] | None:
+    def _read(self, stream: io.FileIO, size: int, kind: str, n_axes: int) -> NDArray[Any] | None:
         """Return the array of an open entry, after verifying every byte."""
         header = stream.read(_HEADER.size)
         if len(header) < _HEADER.size:

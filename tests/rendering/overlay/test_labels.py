@@ -10,7 +10,6 @@ from viewer.rendering.overlay.labels import (
     Dots,
     clear_places,
     crowded,
-    crowded_lines,
     label_places,
     lay_out,
     line_pixels,
@@ -104,22 +103,12 @@ def test_positions_are_sorted_by_distance_from_other_points(scene, room):
 
 def test_crowding_test_has_no_false_positives_and_few_misses(scene, room):
     points, places, dots = scene
-    clear, beside = room
+    clear, _ = room
     found = crowded(places, points, dots, GAP)
     is_near = clear < 1.5 * np.where(places.has_line, GAP, places.own)
     assert not (found & ~is_near).any()
-    pixels, are_part = line_pixels(places, GAP)
-    lines = crowded_lines(places, pixels, are_part, dots, GAP)
-    assert not (lines & (beside >= 0.75 * GAP)).any()
     if len(points) > 1000:
-        assert found.mean() > 0.9 and lines[places.has_line].mean() > 0.9
-
-
-def test_cells_larger_than_the_space_next_to_a_line_are_inconclusive(scene):
-    points, places, _ = scene
-    pixels, are_part = line_pixels(places, GAP)
-    dots = Dots(Cells(PICTURE, 5), points)
-    assert not crowded_lines(places, pixels, are_part, dots, GAP).any()
+        assert found.mean() > 0.9
 
 
 def test_cells_are_numbered_from_one_with_a_border_for_outside_points():
@@ -183,11 +172,9 @@ def test_counts_within_rectangles_are_bounded(dotted):
 def test_every_dot_in_a_rectangle_is_listed_once(dotted):
     points, low, high = dotted
     dots = Dots(Cells((100, 90), 4), points)
-    assert dots.n_layers == (3 if len(points) > 1000 else 1)
     seen = []
-    for layer in range(dots.n_layers):
-        for owners, found in dots.pairs(low, high, layer):
-            seen += zip(owners.tolist(), map(tuple, found.tolist()), strict=True)
+    for owners, found in dots.pairs(low, high):
+        seen += zip(owners.tolist(), map(tuple, found.tolist()), strict=True)
     assert len(seen) == len(set(seen))
     rows, columns = np.nonzero(within(points, low, high))
     wanted = zip(rows.tolist(), map(tuple, points[columns].tolist()), strict=True)
@@ -197,14 +184,15 @@ def test_every_dot_in_a_rectangle_is_listed_once(dotted):
 def test_dots_within_a_quarter_of_a_pixel_count_once():
     points = np.array([(10.0, 10.0), (10.0, 10.0), (10.2, 10.1), (10.3, 10.1)])
     dots = Dots(Cells((40, 40), 4), points)
-    assert dots.count_at(np.array([[10, 10], [20, 10]])).tolist() == [2, 0]
+    ((owners, found),) = dots.pairs(np.array([(9.0, 9.0)]), np.array([(11.0, 11.0)]))
+    assert owners.tolist() == [0, 0] and sorted(found[:, 0].tolist()) == [10.0, 10.3]
 
 
 def test_cells_without_dots_are_empty():
     dots = Dots(Cells((40, 40), 4), np.zeros((0, 2)))
     low, high = np.zeros((1, 2)), np.full((1, 2), 40.0)
     assert dots.fewest_within(low, high) == dots.most_within(low, high) == 0
-    assert sum(len(owners) for owners, _ in dots.pairs(low, high, 0)) == 0
+    assert sum(len(owners) for owners, _ in dots.pairs(low, high)) == 0
 
 
 SMALL_PICTURE = (100, 60)

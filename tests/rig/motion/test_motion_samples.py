@@ -28,7 +28,7 @@ from viewer.rig.motion.evaluation import (
     still_pose,
     world_frames,
 )
-from viewer.rig.motion.instances import local_rotations, palettes, placements, worlds
+from viewer.rig.motion.instances import local_rotations, placements, worlds
 from viewer.rig.motion.motion_paths import motion_path, path_times, segments
 from viewer.rig.motion.onion import FAINTEST, onion
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -378,7 +378,7 @@ def test_batched_matrices_match_each_pose():
     assert np.array_equal(worlds(joints, poses, rotations), found)
 
 
-def test_palettes_depend_on_the_shape():
+def test_skinning_matrices_depend_on_the_shape():
     figure = viewer.load(bundled_body()).actors[0].figure
     poses = []
     rng = np.random.default_rng(1)
@@ -389,7 +389,7 @@ def test_palettes_depend_on_the_shape():
         poses.append(pose)
     body = shaped(figure, poses[0].shape_weights)
     assert body is not figure
-    found = palettes(figure, poses)
+    found = skinning_matrices(worlds(body.skeleton, poses), body.skin.inverse_bind)
     for row, pose in enumerate(poses):
         wanted = skinning_matrices(world_matrices(body.skeleton, pose), body.skin.inverse_bind)
         assert np.allclose(found[row], wanted, atol=1e2 * EXACT)
