@@ -251,6 +251,7 @@ def test_version_1_is_not_changed(tmp_path):
     ("place", "value"),
     [
         (("humanoid", "humanBones"), {"hips": 0}),
+        (("humanoid", "humanBones", 0, "node"), [1]),
         (("firstPerson",), [1]),
         (("firstPerson", "firstPersonBoneOffset"), {"x": 1}),
         (("blendShapeMaster",), 7),

@@ -72,7 +72,7 @@ def _check_bones(source: Source, told: object, version: int, at: str) -> None:
             n=counted(len(missing), "required human bone"),
             names=listed(missing),
         )
-    owners: dict[object, str] = {}
+    owners: dict[int, str] = {}
     seen: set[str] = set()
     for place, bone, node in given:
         if bone in seen:
@@ -87,7 +87,7 @@ def _check_bones(source: Source, told: object, version: int, at: str) -> None:
                 other=quoted(other),
                 node=node,
             )
-        else:
+        elif type(node) is int:
             owners[node] = bone
         seen.add(bone)
     for found in source.diagnostics:
