@@ -27,12 +27,6 @@ SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
 KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for differing images
 
 
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
-
-
 def draw(offscreen: Offscreen, shot: Shot):
     with offscreen.context:
         target: Target = offscreen.target(SIZE, shot.options.samples)

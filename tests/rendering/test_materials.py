@@ -20,7 +20,6 @@ from rendering.front_view import (
 )
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.resources import resource
 from viewer.rig.figure import Figure
@@ -29,12 +28,6 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 
 FLAT = (128, 128, 255)
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from rendering.plain_pictures import draw, plain
 from viewer.rendering.camera import Camera
 from viewer.rendering.colors import part_colors
 from viewer.rendering.gpu.index_sets import kept_triangles
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rig.annotations import BodyParts, ReducedMesh
@@ -20,12 +19,6 @@ from viewer.rig.scene import scene_box
 NAMES = ("left", "right", "belt")
 # The first colours of Okabe and Ito, as published.
 GREY, SKY, ORANGE = (153, 153, 153), (86, 180, 233), (230, 159, 0)
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def striped():

@@ -9,19 +9,12 @@ from rendering.front_view import PIXELS, grid_figure
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.posed_mesh import PosedMesh
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rig.annotations import Keypoints, ReducedMesh
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def parallel() -> Camera:

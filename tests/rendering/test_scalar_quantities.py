@@ -29,12 +29,6 @@ from viewer.rig.skinning import Skinning
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 
 
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
-
-
 def rising(largest=1.0):
     """Return a scene in which "correctives" rises from 0 at the left edge to the right edge."""
     figure = grid_figure()

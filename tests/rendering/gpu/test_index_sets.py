@@ -16,7 +16,6 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu import upload
 from viewer.rendering.gpu.index_sets import curve_order, curve_places, index_set
 from viewer.rendering.gpu.surfaces import PLAIN
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
@@ -100,12 +99,6 @@ def test_curve_interleaves_the_bits_of_cells():
     assert curve_places(cells).tolist() == wanted
     # The result does not depend on size and position of the cloud.
     assert curve_places(cells / 1024 + 64.0).tolist() == wanted
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def rows():

@@ -25,18 +25,10 @@ from rendering.front_view import (
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import upload_surfaces
 from viewer.rendering.gpu.upload import picture_texture
-from viewer.rendering.offscreen import Offscreen
 from viewer.resources import resource
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
 from viewer.rig.scene import Actor, Scene
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
-
 
 # Textures
 

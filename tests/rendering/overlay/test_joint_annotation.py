@@ -7,7 +7,6 @@ from rendering.drawn_figures import skeleton
 from rendering.front_view import PIXELS, alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Labels, leader_lines, letters_for, place_labels
 from viewer.rendering.overlay.joint_marks import (
@@ -102,12 +101,6 @@ def test_lines_connect_the_point_and_its_label(lettering):
 
 
 OFFSETS = [[-1.0, 0.0, -0.5], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # behind the square
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def boned() -> Scene:

@@ -8,7 +8,6 @@ from rendering.drawn_figures import skeleton
 
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.colors import NOTHING, colormap
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import (
     ColoredFigure,
@@ -251,12 +250,6 @@ def test_first_column_is_kept_in_any_width(rows, counts, left_out):
 
 SIZE = 640, 360
 CODE = np.array([1 << 16, 1 << 8, 1])  # converts a colour to a single number
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def rows_with(pixels, color):

@@ -11,7 +11,6 @@ from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import MARK_COLOR, Marks, mark_annotation
 from viewer.rendering.overlay.segments import (
@@ -156,12 +155,6 @@ def test_segments_far_from_the_origin_do_not_jitter(picture):
 
 COLOR = [round(255 * channel) for channel in MARK_COLOR]
 NOTHING = Scene([])
-
-
-@pytest.fixture
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def marked(offscreen, marks, scene=NOTHING, **options):

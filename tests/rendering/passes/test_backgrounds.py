@@ -11,7 +11,6 @@ from rendering.plain_pictures import draw, front, plain
 from viewer.formats._video_images import VideoImages
 from viewer.media.video import VideoSink
 from viewer.rendering.camera import Camera, camera_from_view
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.carried_view import view_in
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -97,12 +96,6 @@ def path(tmp_path_factory):
         sink.write(frame, pixels)
     sink.close()
     return path
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as kept:
-        yield kept
 
 
 def scene_with(path) -> Scene:

@@ -9,7 +9,6 @@ from rendering.drawn_figures import skeleton
 from rendering.front_view import alone
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rig.figure import Figure
 from viewer.rig.scene import scene_box
@@ -17,12 +16,6 @@ from viewer.rig.scene import scene_box
 SIDE = 96
 STYLES = ("octahedra", "sticks", "axes")
 DARK = Light(0.0, 0.0, (0.0, 0.0, 0.0), 0.0)
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def scene_of(parents, offsets, *dofs, boxes=None):

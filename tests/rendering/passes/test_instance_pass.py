@@ -13,7 +13,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
-from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
@@ -180,12 +180,6 @@ def test_placement_and_scale_of_each_actor_are_applied(ctx):
         turned = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         assert np.allclose(turned, wanted, atol=1e-4)
     instances.release()
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def rows_of_arms(count: int, **parts) -> Scene:

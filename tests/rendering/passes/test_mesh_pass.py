@@ -19,7 +19,6 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
@@ -182,12 +181,6 @@ def test_normals_of_a_flattened_surface_are_perpendicular_to_the_plane():
     normals = np.array([[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, -1.0, 2.0]]) @ normal_matrix(flat).T
     assert_allclose(normals[:, [0, 2]], 0.0)
     assert (np.sign(normals[:, 1]) == [1.0, 1.0, -1.0]).all()
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 @pytest.mark.parametrize("placed", [True, False])

@@ -9,7 +9,6 @@ from rendering.front_view import drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.colors import path_colors
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import motion_path_pass
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -19,12 +18,6 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
 PATH = ((0, 0),)
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def walker(*places, rows=None, rate=1.0) -> Actor:

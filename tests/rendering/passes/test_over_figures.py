@@ -9,7 +9,6 @@ from rendering.front_view import PIXELS, alone, drawn, front_view, grid_figure, 
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.target import Target, picture_rows
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation, Labels
 from viewer.rendering.overlay.segments import SegmentStyle, dots
@@ -21,12 +20,6 @@ from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box
 
 RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def dot(place, color, width=12.0, words=(), on_top=True):

@@ -5,7 +5,6 @@ import pytest
 from rendering.drawn_figures import square
 from rendering.front_view import PIXELS, drawn, front_view, pixel
 
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.passes import point_pass
 from viewer.rendering.passes.point_pass import point_radii
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -14,12 +13,6 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
 RADIUS = 0.2  # radius of the drawn balls, 4 pixels
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def dots(*places, limbs=(), sides=None, confidence=None, radius=RADIUS) -> Actor:

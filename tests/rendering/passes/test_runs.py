@@ -20,7 +20,6 @@ from rendering.plain_pictures import N, draw, front, lights, plain
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu import mesh_buffers
 from viewer.rendering.gpu.target import Target, picture_rows
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.outline_pass import Outlined
@@ -32,12 +31,6 @@ from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import skin_from_lists
 
 GROUND = np.array([[-2.0, -1.5, -2.0], [2.0, 1.5, 2.0]])  # at height -1.5
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 @pytest.fixture(params=[1, 100], ids=["instanced", "single"])

@@ -21,7 +21,6 @@ from rendering.front_view import (
 )
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.expressions import ExpressionRules, MaterialBinds
@@ -36,12 +35,6 @@ SHADED = Material(
 )
 RADIUS = 1.0
 UNIT = 20.0  # pixels
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def ball(outline: Outline | None, **changes) -> Figure:
