@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app.linting.checked_scenes import LIGHT, PINK, SIZE, codes, finish, jump, marked, row_of
 from imgui_bundle import imgui
 from lint.planted import weighted
 from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
@@ -22,10 +21,66 @@ from viewer.lint import Places, describe, lint_scene
 from viewer.loading import bundled_files
 from viewer.progress import report
 from viewer.rendering.camera import camera_axes
+from viewer.rendering.overlay.annotation import MARK_COLOR
 from viewer.rig.figure import Figure
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
+
+PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
+SIZE = (1000, 700)
+
+
+# Vertex 5 at (-1, 1, 1) is bound to the foot at the origin; joint 1 is the knee at y = 2. A weight
+# of 0.9 moves the vertex to (-0.9, 0.9, 0.9).
+LIGHT = weighted({5: [(0, 0.9)]})
+
+
+def finish(hand):
+    """Run frames until the check has ended and is shown."""
+    running = hand.state.of(Linting).running
+    if running is not None:
+        running.job.wait()
+    hand.step(3)
+
+
+def codes(hand):
+    return [finding.code for finding in hand.state.of(Linting).checked.findings]
+
+
+def row_of(hand, code):
+    return f"finding {codes(hand).index(code)}"
+
+
+def marked(hand):
+    """Return the number of pixels in the view that have the colour of marks."""
+    pixels = hand.scene_picture()[..., :3].astype(int)
+    return int((np.abs(pixels - PINK).max(axis=-1) <= 6).sum())
+
+
+def jump() -> Scene:
+    """Return a column that is 40 m away in a single frame, frame 130 of the file."""
+    figure = column()
+    clip = standing(figure)
+    places = np.zeros((FRAMES, figure.skeleton.n_joints, 3))
+    places[30, 0, 0] = 40.0
+    return scene_of(figure, replace(clip, translations=places))
+
+
+@pytest.fixture
+def lint(drive):
+    """Open an app on a figure, scene or files with the Lint panel open and the check finished."""
+
+    def open_panel(*shown, **settings):
+        if shown and isinstance(shown[0], Figure | Scene):
+            scene = shown[0] if isinstance(shown[0], Scene) else scene_of(shown[0])
+            shown, settings = (), {"scene": scene, **settings}
+        hand = drive(*shown, size=SIZE, samples=1, **settings)
+        hand.menu("menu Edit", "Check the rig")
+        finish(hand)
+        return hand
+
+    return open_panel
 
 
 def several() -> Figure:
@@ -292,19 +347,6 @@ def files(tmp_path):
     for name, text in TEXTS.items():
         (tmp_path / name).write_text(text)
     return [tmp_path / name for name in TEXTS]
-
-
-@pytest.fixture
-def lint(drive):
-    """Open an app that shows files or a scene with the Lint panel open and the check finished."""
-
-    def open_panel(*paths, **settings):
-        hand = drive(*paths, size=SIZE, samples=1, **settings)
-        hand.menu("menu Edit", "Check the rig")
-        finish(hand)
-        return hand
-
-    return open_panel
 
 
 def test_panel_copies_the_text_that_the_command_prints(lint, files, monkeypatch, capsys):
