@@ -53,11 +53,7 @@ def transfer(
     settings: TransferSettings | None = None,
     name: str = "rigged",
 ) -> Rigged:
-    """Rig a mesh with the rig of another figure, whose pose ``Rigged.pose`` reproduces the mesh.
-
-    Raises ``RigError`` if the template lacks a part, the target has no surface, no part of it meets
-    the template, or SciPy is missing.
-    """
+    """Rig a mesh with the rig of another figure; ``Rigged.pose`` then reproduces the mesh."""
     how = settings or TransferSettings()
     if not template.is_attached:
         raise RigError(

@@ -60,12 +60,7 @@ class Rigged:
 
 
 def with_fields(rigged: Rigged) -> Rigged:
-    """Return a copy with scalar fields that show the certainty of each vertex.
-
-    ``"confidence"`` is the origin of a vertex's weights, ``"distance"`` its distance from
-    the aligned template's surface, ``"guarded"`` whether its rest position is an
-    estimate.
-    """
+    """Return a copy with scalar fields that show the certainty of each vertex."""
     confidence = rigged.confidence.astype(np.float64)
     guarded = rigged.guarded.astype(np.float64)
     fields = (

@@ -252,10 +252,7 @@ def origin_of(actor: Actor, part: str) -> Origin | None:
 
 
 def with_files(opened: Opened, scene: Scene, findings: list[Finding]) -> list[Finding]:
-    """Return readers' messages about the opened files, then findings about a scene, with places.
-
-    The scene may be another one than that of the files, opened from them earlier and edited.
-    """
+    """Return readers' messages, then findings about a scene, which may be edited, with places."""
     return [*_with_actors(opened, scene), *(_placed(one, opened, scene) for one in findings)]
 
 

@@ -51,10 +51,7 @@ def lint_scene(
     options: LintOptions | None = None,
     invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
-    """Run all checks on an open scene: findings by actor, in the order of ``CHECKS``.
-
-    ``invalid``: data of each actor that must not be checked; see ``Subject``.
-    """
+    """Run all checks on an open scene, by actor, in order; ``invalid`` as for ``Subject``."""
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
     counting = counting_of(scene, chosen.frame_rate or rate)

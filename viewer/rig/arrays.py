@@ -97,10 +97,7 @@ def freeze_fields(
 
 
 def freeze(array: NDArray[Item]) -> NDArray[Item]:
-    """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
-
-    For new arrays that no other code changes; a copy would double the memory.
-    """
+    """Make a new array, and those whose memory it uses, read-only, so that ``frozen`` keeps it."""
     owner: object = array
     while isinstance(owner, np.ndarray):
         owner.flags.writeable = False

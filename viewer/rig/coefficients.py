@@ -66,8 +66,7 @@ def apply_coefficients(
 ) -> list[Diagnostic]:
     """Set a group's first weights (N,) in place and its others to 0; None leaves them unchanged.
 
-    ``cut`` ignores coefficients that the figure does not have; otherwise they raise ``RigError``,
-    as do implausibly large ones. Returns messages about ignored coefficients.
+    ``cut`` ignores coefficients that the figure does not have; otherwise they raise ``RigError``.
     """
     if values is None or len(values) == 0:
         return []

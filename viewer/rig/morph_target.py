@@ -47,9 +47,7 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals are computed with the same formula, before skinning. Joints do not move. Raises
-    ``RigError`` if a vertex index lies outside the mesh, or the figure has no mesh, or has blend
-    shapes other than morphs.
+    Normals are computed with the same formula, before skinning. Joints do not move.
     """
     if not targets:
         return figure

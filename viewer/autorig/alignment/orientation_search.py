@@ -54,7 +54,7 @@ def axis_rotations(
     """Return the rotations (3, 3) that map axes to axes: 24, 4 or 1, the least angle first.
 
     The template's up axis is mapped to ``up``, its front, +z if y is up and +x if z is up, to
-    ``facing``. Raises ``RigError`` if up and facing are the same or opposite.
+    ``facing``.
     """
     for name in filter(None, (up, facing)):
         if name not in AXES:

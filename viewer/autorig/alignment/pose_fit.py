@@ -96,10 +96,7 @@ def fit_pose(
     near: Side,
     scales: bool,
 ) -> Fitted:
-    """Rotate a template's joints and scale its limbs until its surface matches the target's.
-
-    Limbs of a symmetric template are scaled equally on both sides. Pose correctives are ignored.
-    """
+    """Rotate a template's joints and scale its limbs, both sides alike, to match the target."""
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
     chosen = even_vertices(mesh.positions, mesh.triangles, _VERTICES)

@@ -64,11 +64,7 @@ class Similarity:
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
-    """Return the similarity that maps points (N, 3) closest to targets, in the least-squares sense.
-
-    Raises ``RigError`` if there are fewer than three pairs, or the points are collinear: any
-    rotation about the line then fits equally well.
-    """
+    """Return the similarity that maps three or more points (N, 3), not on a line, to targets."""
     if len(points) < 3 or len(points) != len(targets):
         raise RigError(
             f"alignment: expected 3 or more pairs of points, found {len(points)} and {len(targets)}"

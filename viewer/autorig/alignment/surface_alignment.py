@@ -145,11 +145,7 @@ def align(
     template_up: str,
     settings: AlignmentSettings,
 ) -> Alignment:
-    """Find the similarity that aligns the template with the target.
-
-    Raises ``RigError`` if a mesh has no area, landmarks are collinear, or axes contradict each
-    other.
-    """
+    """Find the similarity that aligns the template with the target."""
     report_fraction(0.0, "aligning the template")
     samples = settings.samples
     ours, theirs = fine = _surface(template, samples), _surface(target, samples)
@@ -211,11 +207,7 @@ def _refined(
 
 
 def similarity_of(matrix: Floats) -> Similarity:
-    """Return a 4 x 4 matrix as a similarity, with separate scales in at most one of the spaces.
-
-    Raises ``RigError`` if it reflects, shears, or scales along directions other than the axes of
-    the template or of the target.
-    """
+    """Return a 4 x 4 matrix as a similarity, or raise ``RigError`` if it shears or reflects."""
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     determinant = float(np.linalg.det(linear))
     if not determinant > 0.0:

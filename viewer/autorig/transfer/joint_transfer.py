@@ -45,11 +45,8 @@ def surface_shifts(
 
 
 def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
-    """Return a regressor of joint positions: b_v = w_vj w_v,parent, where both joints have weight.
-
-    A root uses the boundary with its children. Rows are not normalised; a joint without a boundary
-    has an empty row.
-    """
+    """Return a regressor b_v = w_vj w_v,parent of vertices with both joints; rows may be empty."""
+    # A root uses the boundary with its children. Rows are not normalised.
     owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
     count = skin.n_joints
     keys = owners * count + skin.joints

@@ -93,12 +93,7 @@ def transferred_weights(
     triangles: Ints,
     settings: WeightSettings,
 ) -> WeightTransfer:
-    """Transfer weights by closest points, and inpaint vertices that do not meet the template.
-
-    Rows sum to 1. Only inpainted weights, and corners with a barycentric coordinate, below 1e-6 are
-    dropped. Raises ``RigError`` if no vertex of the target meets the template, the target is a
-    point, weights of the template are missing, or SciPy is missing.
-    """
+    """Transfer weights by closest points, and inpaint vertices that do not meet the template."""
     source = weight_matrix(weights, template.triangles)
     size = box_size(bounding_box(positions))
     if size <= 0.0:
@@ -112,6 +107,8 @@ def transferred_weights(
     if not found.matched.any():
         raise RigError(nothing_matched(found.points.distances, size))
     report_fraction(0.4, "transferring weights")
+    # Rows sum to 1. Only inpainted weights, and corners with a barycentric coordinate, below 1e-6
+    # are dropped.
     rows = interpolate(_without_residue(found.points), template.triangles, source)
     has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
     rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
@@ -390,8 +387,7 @@ def weight_matrix(skin: Skin, triangles: Ints) -> csr_array:
     """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
 
     Repeated weights for a joint are added, negative ones set to 0. Vertices without triangles may
-    have no weights. Raises ``RigError`` if the skin has fewer vertices than the triangles refer to,
-    or the weights of a triangle corner sum to 0.
+    have no weights.
     """
     if triangles.max(initial=-1) >= skin.n_vertices:
         raise RigError(

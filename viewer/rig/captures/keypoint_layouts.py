@@ -132,11 +132,7 @@ _ALIKE = (
 
 
 def keypoint_layout(count: int, title: str = "") -> PointLayout:
-    """Return the layout of a set of keypoints; ``title`` decides if several have this count.
-
-    Without any, the names are ``point0``, ``point1`` … and there are no limbs. Raises ``RigError``
-    if the named layout does not exist or has a different number of keypoints.
-    """
+    """Return the layout of a set of keypoints; ``title`` decides if several have this count."""
     known = TITLES.get(count, ())
     if title and title not in known:
         sizes = {name: size for size, names in TITLES.items() for name in names}

@@ -49,11 +49,7 @@ def constrained_matrices(
 def constrained(
     skeleton: Skeleton, rotations: Floats, translations: Floats, scales: Floats
 ) -> Floats:
-    """Return local rotations (J, ..., 4) with all constraints applied, in the skeleton's order.
-
-    The result does not depend on the rotations of constrained joints, so the function is
-    idempotent. ``translations`` and ``scales`` are (J, ..., 3), local.
-    """
+    """Return local rotations (J, ..., 4) with all constraints applied, idempotently."""
     if not skeleton.constraints:
         return rotations
     result = rotations.copy()

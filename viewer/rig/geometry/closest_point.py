@@ -56,10 +56,7 @@ class SurfacePoints:
 
 
 class Surface:
-    """A mesh prepared for closest-point queries; degenerate triangles are segments or points.
-
-    Raises ``RigError`` if there is no triangle, an index is out of range, or SciPy is missing.
-    """
+    """A mesh prepared for closest-point queries; degenerate triangles are segments or points."""
 
     def __init__(self, positions: Floats, triangles: Ints) -> None:
         positions = frozen("positions", positions, (None, 3))

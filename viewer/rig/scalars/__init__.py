@@ -132,7 +132,6 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     """Return the values (V,) of a scalar quantity; without a pose, in the bind pose.
 
     If the figure lacks the part that the quantity needs, they are 0, or -1 for categorical ones.
-    Raises ``RigError`` if the quantity is unknown, or the figure lacks its joint or field.
     """
     key, about = split_name(name)
     quantity = SCALARS[key]
