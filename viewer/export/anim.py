@@ -35,17 +35,11 @@ _SAME = 1e-9  # tolerance, in frames or length units
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a motion as a clip of keys, see ``viewer.export.export``.
+    """Write a motion of a figure with the DOFs of a ``.skel`` as a clip; only gaps are an option.
 
     A keyframed clip that is requested as a whole is written exactly, with its own keys. Any other
     motion gets a key per frame, with linear or smooth tangents, whichever give the smaller joint
     error.
-
-    ``animation``: animation of a figure with the DOFs of a ``.skel`` file. ``path``: the file;
-    ``gaps="split"`` writes ``name-1.anim``, ``name-2.anim`` … if there are gaps. ``options``:
-    options; only ``gaps`` is used. Returns notes: the written files, joint errors, and the data
-    that the format cannot store. Raises ``RigError`` if the figure has other DOFs, or no frame is
-    present. Raises ``OutputError`` if a file cannot be written.
     """
     animation = selection.part.animation
     figure, frames = animation.figure, animation.frames
@@ -62,8 +56,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
             notes.append(
                 Diagnostic(
                     "X003.clip-placement: the placement of the whole figure is not part of its "
-                    "clip "
-                    "and is omitted"
+                    "clip and is omitted"
                 )
             )
         return notes + _left_out(figure, frames)
@@ -83,7 +76,7 @@ def _export_frames(
     animation: SampledAnimation, skeleton: Skeleton, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
     """Write a key per frame, in one file or one for each run of frames."""
-    frames = animation.frames
+    figure, frames = animation.figure, animation.frames
     whole = filled(frames, options.closing == "interpolate")
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(whole.rotations)
@@ -123,7 +116,9 @@ def _export_frames(
     ]
     for file, span in zip(paths, spans, strict=True):
         notes += _losses(animation, Source(file, saved[file]), span, options)
-    return notes + _remarks(animation, options)
+    first = animation.first_frame
+    notes += gaps_note(frames.present, first, options.closing, interpolate="interpolated")
+    return notes + _left_out(figure, frames)
 
 
 def _losses(
@@ -145,12 +140,6 @@ def _losses(
 
 def _middles(times: Floats) -> Floats:
     return 0.5 * (times[1:] + times[:-1])
-
-
-def _remarks(animation: SampledAnimation, options: ExportOptions) -> list[Diagnostic]:
-    frames, first = animation.frames, animation.first_frame
-    notes = gaps_note(frames.present, first, options.closing, interpolate="interpolated")
-    return notes + _left_out(animation.figure, frames)
 
 
 def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:

@@ -43,11 +43,7 @@ _CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton'
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write skeleton and skin, read them back, and report the error of the posed mesh.
-
-    The shape is applied to the rest mesh, the pose becomes the file's pose, and the figure's
-    translation is added to the root's offset.
-    """
+    """Write skeleton and skin in the pose and shape, and report the error of the posed mesh."""
     actor, skinning = selection.part.actor, options.skinning
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None:

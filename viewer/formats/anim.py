@@ -327,12 +327,7 @@ class _Parser(WordParser):
 
 
 def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
-    """Write a clip.
-
-    ``path``: replaced only when the whole text has been written. Raises ``UnsupportedFormatError``
-    if the content is a figure, or channels are missing or in a different order. Raises
-    ``OutputError`` if the file cannot be written.
-    """
+    """Write a clip with a channel per DOF, in the order of the DOFs."""
     if not isinstance(clip, Clip):
         raise UnsupportedFormatError(
             Diagnostic("F002.anim-figure: .anim stores a clip, not a figure")

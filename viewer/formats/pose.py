@@ -571,12 +571,7 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
-    """Write one pose in the format of the suffix.
-
-    ``path``: ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector. Raises
-    ``UnsupportedFormatError`` if the content is not a pose. Raises ``OutputError`` if the file
-    cannot be written.
-    """
+    """Write one pose: ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector."""
     suffix = Path(path).suffix.lower()
     if not isinstance(content, PoseRecord):
         raise UnsupportedFormatError(f"{suffix} stores a pose, not a figure or clip")

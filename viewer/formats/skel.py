@@ -248,14 +248,7 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
 
 
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
-    """Write a figure's skeleton.
-
-    ``figure``: figure with a skeleton in depth-first order, with rotation DOFs and without rest
-    rotations. ``path``: file, replaced only when the whole text has been written. The result is
-    empty: the format stores every property of a skeleton that it accepts. Raises
-    ``UnsupportedFormatError`` if the format cannot store the skeleton. Raises ``OutputError`` if
-    the file cannot be written.
-    """
+    """Write a skeleton in depth-first order, with rotation DOFs and without rest rotations."""
     # Imported here, so that reading a skeleton does not import what only writers need.
     from viewer.media.saving import save_text
 

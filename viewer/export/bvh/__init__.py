@@ -54,16 +54,9 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
 
     Offsets are those of the shape in the first present frame. The root has offset 0 and its
     position in its channels, so that readers which add offsets and readers which replace them
-    agree. Angles are unwrapped.
-
-    A file contains no mesh. The reported vertex error is the distance between the figure's mesh and
-    the same mesh, in the shape of the bones, skinned with the file's joints; both use LBS.
-
-    Parts are converted once, or twice if joints with a parent may be translated, since a file has
-    position channels only for joints that move.
-
-    Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame, digits are
-    options. Raises ``RigError`` if numbers are not finite, or an option is unknown.
+    agree. Angles are unwrapped. A file contains no mesh: the reported vertex error is the distance
+    between the figure's mesh and the same mesh, in the shape of the bones, skinned by LBS with the
+    file's joints.
     """
     for what, value, known in (
         ("unit", options.unit, ("", *METRES)),

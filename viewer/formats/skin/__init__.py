@@ -31,7 +31,14 @@ from viewer.formats._polygons import filled_normals
 from viewer.formats._references import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats.skin.sections import KEYWORDS, LOST, Sections, check_declared, read_sections
+from viewer.formats.skin.sections import (
+    KEYWORDS,
+    LOST,
+    Sections,
+    check_declared,
+    read_sections,
+    weights_lines,
+)
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
 from viewer.phrases import all_of, optional, printable, rounded
@@ -271,16 +278,7 @@ def _checked_influences(source: Source, sections: Sections, n_joints: int) -> tu
 
 
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
-    """Write a figure's mesh, weights and bindings, and any of its texture images that are missing.
-
-    ``figure``: figure with a mesh. Without a skin, weights and bindings are omitted. ``path``:
-    replaced only when the whole text has been written. Returns notes about properties of materials
-    that are omitted, and about vertices that were split. Raises ``UnsupportedFormatError`` if there
-    is no mesh, or a name or number does not conform to the grammar. Raises ``OutputError`` if a
-    file cannot be written.
-    """
-    from viewer.formats.skin.sections import weights_lines
-
+    """Write a figure's mesh, weights and bindings, and its texture images that are missing."""
     if figure.mesh is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
     mesh, sources = without_seams(figure.mesh)
