@@ -12,8 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
-from viewer.formats._file_bytes import MAX_SIZE, unreadable
-from viewer.formats._source import Source
+from viewer.formats._source import MAX_SIZE, Source, unreadable
 from viewer.phrases import Remedy, listed
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._file_bytes import read_bytes
-from viewer.formats._source import Source
+from viewer.formats._source import Source, read_bytes
 from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
 

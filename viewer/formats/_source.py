@@ -1,32 +1,27 @@
-"""A file being read: its bytes, its diagnostics, and line numbers computed on demand."""
+"""A file being read: its bytes and their limits, its diagnostics, and lines found on demand."""
 
 from __future__ import annotations
 
+import os
 import re
+import stat
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.diagnostics import Collector, Diagnostic, Part, Phrase
+from viewer.diagnostics import Collector, Diagnostic, Part, Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._file_bytes import (
-    FOLDER,
-    MAX_SIZE,
-    kind_of,
-    no_file,
-    read_bytes,
-    read_head,
-    read_part,
-    read_pipe,
-)
 from viewer.formats._text.numbers import word_begins
+from viewer.interrupts import raising
+from viewer.phrases import Remedy, optional
 from viewer.progress import report_bytes
 
-Content = TypeVar("Content")
+_Content = TypeVar("_Content")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _MAGIC = (
     (b"\x1f\x8b", "gzip data"),
@@ -48,8 +43,27 @@ _MARKED = 8  # number of bytes with a mark at the start
 _TAIL = 4096  # number of bytes of which each read at the end removes the marks
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
+
 # Files with these first bytes are binary and may end with any byte.
 _ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
+MAX_SIZE = 2 << 30
+"""Default size limit for files, bytes."""
+FOLDER = "a folder"
+"""Name of a folder in the result of ``_kind_of``."""
+
+# Maximum number of names in a folder that are compared with the name of a missing file.
+_MOST_FILES = 2000
+_ALIKE = 0.8  # minimum similarity; high, because many file names share a suffix and more
+_MOST_LINKS = 8  # links to a descriptor: /dev/stdin has one, and users may add some
+_DESCRIPTORS = ("/dev/fd", "/proc/self/fd")
+_PIECE = 1 << 20  # bytes read from a pipe at once
+_KINDS = {
+    stat.S_IFDIR: FOLDER,
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
 
 
 class Source:
@@ -86,15 +100,15 @@ class Source:
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Open a file, folder or pipe, see ``read_pipe``; errors as in ``read_bytes``."""
-        piped = read_pipe(Path(path), max_size)
+        """Open a file, folder or pipe, see ``_read_pipe``; errors as in ``read_bytes``."""
+        piped = _read_pipe(Path(path), max_size)
         source = cls(path, piped, max_size=max_size, diagnostics=diagnostics)
         if piped is not None:
             return source
-        kind = kind_of(source.path, max_size)
+        kind = _kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
         if kind is not None and not source.is_folder:
-            raise no_file(source.path, kind)
+            raise _no_file(source.path, kind)
         return source
 
     @property
@@ -142,13 +156,13 @@ class Source:
 
     def peek(self, size: int) -> bytes:
         """Return the first bytes of the file; no more is read."""
-        return read_head(self.path, size) if self._data is None else self._data[:size]
+        return _read_part(self.path, 0, size) if self._data is None else self._data[:size]
 
-    def once(self, opened: Callable[[Source], Content]) -> Content:
+    def once(self, opened: Callable[[Source], _Content]) -> _Content:
         """Return the cached result of a function of this file, which is called on first use."""
         if opened not in self._opened:
             self._opened[opened] = opened(self)
-        return cast("Content", self._opened[opened])
+        return cast("_Content", self._opened[opened])
 
     def inside(self, name: str) -> Source:
         """Return a file of this folder, which shares the diagnostics of this source."""
@@ -344,7 +358,7 @@ class LongText:
 
     def __init__(self, path: Path, size: int) -> None:
         self._path, self._first, self._end = path, 0, size
-        head = read_part(path, 0, _MARKED)
+        head = _read_part(path, 0, _MARKED)
         if not head.startswith(_ANY_END):
             self._first = len(head) - len(head.removeprefix(_BYTE_ORDER_MARK))
             while (tail := self.part(max(len(self) - _TAIL, 0), len(self))).endswith(_CONTROL_Z):
@@ -353,7 +367,7 @@ class LongText:
     @classmethod
     def open(cls, path: Path, max_size: int) -> LongText | None:
         """Return a long regular file; None for all others, which are to be read as a whole."""
-        if kind_of(path, max_size) is not None:
+        if _kind_of(path, max_size) is not None:
             return None
         size = path.stat().st_size
         return cls(path, size) if size > _LONG else None
@@ -363,7 +377,7 @@ class LongText:
 
     def part(self, start: int, end: int) -> bytes:
         """Return the bytes between two offsets."""
-        return read_part(self._path, self._first + start, max(min(end, len(self)) - start, 0))
+        return _read_part(self._path, self._first + start, max(min(end, len(self)) - start, 0))
 
 
 def line_parts(text: bytes | LongText, length: int, start: int = 0) -> Iterator[bytes]:
@@ -410,3 +424,127 @@ def _lone_returns(block: bytes) -> int:
     is_return = np.concatenate([letters == ord("\r"), [False]])
     begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
     return int((ends - begins)[letters[ends + 1] != ord("\n")].sum())
+
+
+def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
+    """Read a whole regular file; if it has more than ``max_size`` bytes, it is refused unread."""
+    kind = _kind_of(path, max_size)
+    if kind is not None:
+        raise _no_file(path, kind)
+    return _read_part(path, 0, -1)
+
+
+def _kind_of(path: Path, max_size: int) -> str | None:
+    """Return the kind of file at a path without opening it; None for a regular file."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as problem:
+        raise _unreadable(path, problem) from None
+    if not stat.S_ISREG(status.st_mode):
+        return _KINDS.get(stat.S_IFMT(status.st_mode), "an unknown kind of file")
+    if status.st_size > max_size:
+        values = {
+            "most": max_size,
+            "size": status.st_size,
+            "remedy": Remedy("", " (see --max-size)"),
+        }
+        raise FormatError(Diagnostic(wording.TOO_LARGE, path, values=values))
+    return None
+
+
+def _read_pipe(path: Path, max_size: int) -> bytes | None:
+    """Return what a pipe that this process was given delivers; None for any other file."""
+    # A pipe is an open descriptor: /dev/stdin, or /dev/fd/63 of <(…) in a shell. It can be read
+    # once only, so its bytes are kept for all readers. Other pipes in the file system are not read:
+    # without a writer, opening one waits forever.
+    number = _descriptor(path)
+    try:
+        status = None if number is None else os.fstat(number)
+    except OSError:
+        status = None
+    if number is None or status is None or not stat.S_ISFIFO(status.st_mode):
+        return None
+    key = status.st_dev, status.st_ino
+    if key not in _piped:
+        parts, size = [], 0
+        try:
+            with raising():
+                while part := os.read(number, _PIECE):
+                    parts.append(part)
+                    size += len(part)
+                    if size > max_size:
+                        values = {"most": max_size, "remedy": Remedy("", " (see --max-size)")}
+                        raise FormatError(
+                            Diagnostic(
+                                "F001.pipe-too-large: expected at most {most:,.0f} bytes, found "
+                                "more{remedy}",
+                                path,
+                                values=values,
+                            )
+                        )
+        except OSError as problem:
+            raise _unreadable(path, problem) from None
+        _piped[key] = b"".join(parts)
+    return _piped[key]
+
+
+_piped: dict[tuple[int, int], bytes] = {}
+
+
+def _descriptor(path: Path) -> int | None:
+    """Return the descriptor of this process that a path stands for, following links."""
+    here = Path(os.path.abspath(path))  # noqa: PTH100 (links are followed one by one)
+    for _ in range(_MOST_LINKS):
+        if str(here.parent) in _DESCRIPTORS and here.name.isdigit():
+            return int(here.name)
+        try:
+            here = here.parent / here.readlink()
+        except (OSError, ValueError):
+            return None
+    return None
+
+
+def _read_part(path: Path, start: int, size: int) -> bytes:
+    """Return the bytes from an offset; a size of -1 means all."""
+    try:
+        with path.open("rb") as stream:
+            stream.seek(start)
+            return stream.read(size)
+    except (OSError, ValueError) as problem:
+        raise _unreadable(path, problem) from None
+
+
+def _unreadable(path: Path, problem: Exception) -> FormatError:
+    reason = getattr(problem, "strerror", None) or problem
+    near = _near_files(path) if isinstance(problem, FileNotFoundError) else ""
+    return unreadable(path, reason, near)
+
+
+def unreadable(path: Path, reason: object, near: str = "") -> FormatError:
+    """Return the error for a file that cannot be read."""
+    return FormatError(
+        Diagnostic(
+            "F001.unreadable: cannot be read: {reason}{near}",
+            path,
+            values={"reason": str(reason), "near": optional("; {}", near)},
+        )
+    )
+
+
+def _no_file(path: Path, kind: str) -> FormatError:
+    return FormatError(
+        Diagnostic("F001.no-file: expected a file, found {found}", path, values={"found": kind})
+    )
+
+
+def _near_files(path: Path) -> str:
+    """Return a question that suggests files with similar names; empty if there are none."""
+    try:
+        with os.scandir(path.parent) as entries:
+            names = [entry.name for entry in islice(entries, _MOST_FILES)]
+    except OSError:  # the folder is missing too, or cannot be listed
+        return ""
+    from viewer.near_names import did_you_mean
+
+    # A dangling link has exactly the missing name.
+    return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

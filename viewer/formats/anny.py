@@ -36,8 +36,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
 from viewer.formats._archive.checking import are_indices
-from viewer.formats._file_bytes import read_bytes
-from viewer.formats._source import Source
+from viewer.formats._source import Source, read_bytes
 from viewer.formats._text.numbers import parse_numbers
 from viewer.phrases import listed, quoted
 from viewer.rig.arrays import Deferred, Floats, Ints

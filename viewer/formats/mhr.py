@@ -31,8 +31,7 @@ from viewer.formats._archive.checking import (
     finite_array,
 )
 from viewer.formats._archive.values import Archive
-from viewer.formats._file_bytes import unreadable
-from viewer.formats._source import Source
+from viewer.formats._source import Source, unreadable
 from viewer.phrases import listed, optional, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import BlendShapes, Correctives

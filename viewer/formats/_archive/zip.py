@@ -17,8 +17,7 @@ from typing import IO, cast, overload
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._file_bytes import unreadable
-from viewer.formats._source import Source, phrased
+from viewer.formats._source import Source, phrased, unreadable
 from viewer.phrases import Remedy, printable
 
 DAMAGE = (

@@ -16,9 +16,8 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
-from viewer.formats._file_bytes import unreadable
 from viewer.formats._published_models import published_names
-from viewer.formats._source import InvalidValueError, Source
+from viewer.formats._source import InvalidValueError, Source, unreadable
 from viewer.formats._text.json_places import (
     Keys,
     decoded,

@@ -12,8 +12,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._file_bytes import read_bytes
 from viewer.formats._references import is_file, referenced_path, refused_text
+from viewer.formats._source import read_bytes
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.meshopt import decoded_view, meshopt_of
 from viewer.phrases import counted, quoted
