@@ -353,6 +353,7 @@ def _plain_rows(skeleton: Skeleton, pose: Pose) -> tuple[Ints, Bools]:
     is_plain: Bools = (rotated <= _SAME) & (skeleton.posing is None)
     for row in np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION).tolist():
         joint, axis = int(skeleton.dof_joints[row]), int(skeleton.dof_kinds[row]) - FIRST_ROTATION
+        # R = Rz Ry Rx needs the row of x before that of y before that of z, each once.
         if rows[joint, axis:].max() >= 0:
             is_plain[joint] = False  # another order of rotations
         rows[joint, axis] = row
@@ -364,6 +365,7 @@ def _unscaled_offsets(
     skeleton: Skeleton, pose: Pose, translations: Floats, rotations: Floats
 ) -> Floats:
     """Return the offsets that put unscaled joints where the scaled ones are: (J, 3)."""
+    # With the product D of the rotations down to the parent, an offset is D^-1 (p_j - p_parent).
     scaled = rotations * pose.scales[:, None]
     places = joint_worlds(skeleton.parents, scaled, translations)[:, :3, 3]
     turns = joint_worlds(skeleton.parents, rotations, np.zeros(3))[:, :3, :3]

@@ -78,6 +78,8 @@ def _fan(size: int) -> Picks:
 
 def _area_vectors(points: Floats) -> Floats:
     """Return twice each polygon's area along its normal (Newell): (F, 3)."""
+    # The area vectors p_i x p_(i+1) of the triangles at the origin add up to that of the polygon;
+    # with the first corner as origin, large coordinates do not cancel each other.
     relative = points - points[:, :1]
     return np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
 
@@ -85,6 +87,7 @@ def _area_vectors(points: Floats) -> Floats:
 def _is_covered(points: Floats, triangles: Picks, normals: Floats) -> Bools:
     """Return a mask of polygons whose triangles all face the same way as the polygon: (F,)."""
     a, b, c = (points[:, triangles[:, corner]] for corner in range(3))
+    # Triangles of one orientation whose area vectors add up to that of the polygon do not overlap.
     facing = np.einsum("fta,fa->ft", np.cross(b - a, c - a), normals)
     return (facing > 0.0).all(axis=1)
 
@@ -111,6 +114,8 @@ def _ears(points: Floats) -> Picks:
         before, after = np.roll(left, 1, axis=1), np.roll(left, -1, axis=1)
         corners = [points[rows[:, None], index] for index in (before, left, after)]
         areas = _cross(corners[1] - corners[0], corners[2] - corners[0])
+        # An ear is a convex corner whose triangle contains no other corner; every simple polygon of
+        # four or more corners has two (Meisters 1975).
         is_ear = (areas > 0.0) & ~_has_inside(corners, corners[1])
         # A self-intersecting polygon may have no ear left; the largest corner is then clipped
         # instead.
@@ -127,6 +132,8 @@ def _has_inside(corners: list[Floats], points: Floats) -> Bools:
     """Return a mask of triangles that contain a point other than their corners: (F, k)."""
     inside = np.ones((*points.shape[:2], points.shape[1]), dtype=np.bool_)
     spots = points[:, None]
+    # A point is inside if it is left of all three edges. Corners at the same place as one of the
+    # triangle's are not: the edge to a hole is followed twice, so its ends occur twice.
     for start, end in ((0, 1), (1, 2), (2, 0)):
         a, b = corners[start][:, :, None], corners[end][:, :, None]
         inside &= _cross(b - a, spots - a) >= 0.0

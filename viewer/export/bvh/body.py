@@ -85,6 +85,7 @@ class Conversion:
 
     def bones(self) -> tuple[Floats, Bools]:
         """Return offsets and which joints move, (J, 3), (J,), after all frames are converted."""
+        # Positions far from the origin are rounded more coarsely than the skeleton's size suggests.
         noise = _NOISE * (self._size + 1e-3 * self._farthest)
         is_moved = ((self._high - self._low) > noise).any(axis=1)
         moves = self._inner & is_moved
@@ -137,6 +138,7 @@ def _positions(
         own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]
         places = places + own - places[:, roots]
     places = places @ space.world.T * space.factor
+    # D, the product of the file's rotations down from the root; p_j = D_parent^-1 (x_j - x_parent).
     world = joint_worlds(parents, rotations, np.zeros(3))[..., :3, :3]
     from_parent = places - np.where(inner, places[:, parents], 0.0)
     within = np.einsum("njba,njb->nja", world[:, parents], from_parent)
@@ -163,6 +165,7 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
     skeleton = figure.require_skeleton()
     parents = skeleton.parents
     rest = quaternion_to_matrix(skeleton.rest_rotations)
+    # Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1; x replaces the first e at the root.
     before = _parent_axes(skeleton, space)
     after = np.swapaxes(rest, -1, -2) @ np.swapaxes(before, -1, -2)
     before[parents < 0] = space.world

@@ -19,7 +19,7 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
 Facts = tuple[tuple[str, str], ...]
-_INCHES = (30.0, 90.0)
+_INCHES = (30.0, 90.0)  # heights of humans in inches, 0.76 to 2.3 m
 _RATES = (
     *(12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 144.0, 150.0),
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
@@ -28,7 +28,7 @@ _RATES = (
 _LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
 _DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
-_UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
+_UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis, 37 degrees
 
 # Distance from the ground, and length of a path that is none, relative to the body.
 _NEAR, _STILL = 0.15, 1e-3

@@ -392,6 +392,8 @@ def rotations_of(table: Table, values: Floats) -> Floats:
 
 def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
     """Multiply quaternions (x, y, z, w) on the right by rotations about an axis, in place."""
+    # (v, w) (s e, c) = (w s e + c v + s v x e, w c - s v . e) for the axis e, with s and c the sine
+    # and cosine of half the angle; v x e has the components (0, v_3, -v_2) in the order e, 2, 3.
     other, third = (axis + 1) % 3, (axis + 2) % 3
     a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
     parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
