@@ -64,23 +64,19 @@ def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
     """Return the frame rate of a file whose frame time cannot be in seconds, and warn."""
     is_standard = _nearest_rate(frame_time, seconds) in _RATES
     in_milliseconds = _nearest_rate(frame_time, 1000.0 / seconds)
-    if is_standard or seconds.is_integer() or in_milliseconds not in _RATES:
-        source.warn(
-            "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a "
-            "frame rate; {rate:g} fps assumed ({remedy} overrides it)",
-            found=bare(frame_time),
-            rate=seconds,
-            remedy=Remedy("Frames per second in the Timeline", "--fps"),
-        )
-        return seconds
+    is_rate_written = is_standard or seconds.is_integer() or in_milliseconds not in _RATES
+    rate = seconds if is_rate_written else in_milliseconds
     source.warn(
-        "C017.bvh-milliseconds: Frame Time: expected seconds, found {found}, which looks "
+        "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a frame "
+        "rate; {rate:g} fps assumed ({remedy} overrides it)"
+        if is_rate_written
+        else "C017.bvh-milliseconds: Frame Time: expected seconds, found {found}, which looks "
         "like milliseconds; {rate:g} fps assumed ({remedy} overrides it)",
         found=bare(frame_time),
-        rate=in_milliseconds,
+        rate=rate,
         remedy=Remedy("Frames per second in the Timeline", "--fps"),
     )
-    return in_milliseconds
+    return rate
 
 
 def _nearest_rate(frame_time: bytes, exact: float) -> float:
@@ -148,39 +144,26 @@ def guess_up(
         other: Literal["y", "z"] = "z" if up == "y" else "y"
         size = float(np.linalg.norm(heights, axis=1).mean())
         if rest in ("+y", "+z") and _lies(posed, other, up, size):
-            notes = (
-                Phrase(
-                    "{up} up assumed, although the skeleton is upright along {axis} in the frames",
-                    up=up,
-                    axis=stands,
-                ),
+            note = Phrase(
+                "{up} up assumed, although the skeleton is upright along {axis} in the frames",
+                up=up,
+                axis=stands,
             )
-            return up, (("up", f"{up}, from the rest skeleton"),), notes
+            return up, (("up", f"{up}, from the rest skeleton"),), (note,)
         note = Phrase(wording.UP_OF_FRAMES, up=other, axis=rest or Phrase("no axis"))
         return other, (("up", f"{other}, from the frames"),), (note,)
     if up == "z":
-        return (
-            "z",
-            (("up", "z, from the rest skeleton"),),
-            (Phrase("{up} up assumed: the head is above the feet along {up}", up="z"),),
-        )
+        note = Phrase("{up} up assumed: the head is above the feet along {up}", up="z")
+        return "z", (("up", "z, from the rest skeleton"),), (note,)
     if rest == "+y":
         return "y", (("up", "y, from the rest skeleton"),), ()
     if stands == "+y":
         note = Phrase(wording.UP_OF_FRAMES, up="y", axis=rest or Phrase("no axis"))
         return "y", (("up", "y, from the frames"),), (note,)
-    told = (
-        (
-            Phrase(
-                "{up} up assumed, although the rest skeleton is upright along {axis}",
-                up="y",
-                axis=rest,
-            ),
-        )
-        if rest
-        else ()
+    note = Phrase(
+        "{up} up assumed, although the rest skeleton is upright along {axis}", up="y", axis=rest
     )
-    return "y", (("up", "y, assumed"),), told
+    return "y", (("up", "y, assumed"),), (note,) if rest else ()
 
 
 def _lies(posed: Floats, along: str, up: str, size: float) -> bool:

@@ -306,21 +306,23 @@ def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> F
 def _warn_of_difference(
     source: Source, width: int, declared: int | None, whole: int, rest: int
 ) -> None:
-    expected = None if declared is None else Phrase("{n}", n=counted(declared, "frame"))
+    frames = None if declared is None else Phrase("{n}", n=counted(declared, "frame"))
     part = Phrase("{n} of {width} numbers for the next", n=rest, width=width) if rest else None
+    expected = optional("expected {} as declared by Frames, ", frames)
+    more = optional(" and {}", part)
     if whole == 0 and (declared or rest):
         raise source.fault(
             "F002.bvh-no-frame: {expected}found none{rest}",
             source.end,
-            expected=optional("expected {} as declared by Frames, ", expected),
-            rest=optional(" and {}", part),
+            expected=expected,
+            rest=more,
         )
     source.warn(
         "F007.bvh-frames: {expected}found {found}{rest}; only complete frames are used",
         source.end,
-        expected=optional("expected {} as declared by Frames, ", expected),
+        expected=expected,
         found=whole,
-        rest=optional(" and {}", part),
+        rest=more,
     )
 
 

@@ -610,28 +610,15 @@ def _refuse_lines(
     vertex = int(vertices[0])
     head = int(heads[vertex])
     is_count = words.values[head] >= 0 and words.values[head] % 1 == 0
+    key, values = wording.SKIN_INFLUENCE_COUNT, dict[str, object](found=quoted(words.word(head)))
     if is_count:
-        source.refuse(
+        key = (
             "F002.skin-influences: skinweights of vertex {vertex}: expected {pairs} "
-            "joint-weight pairs, found {found} numbers on the line",
-            int(words.offsets[head]),
-            len(vertices),
-            "weights",
-            vertices,
-            vertex=vertex,
-            pairs=bare(words.word(head)),
-            found=int(after[vertex]) - head - 1,
+            "joint-weight pairs, found {found} numbers on the line"
         )
-    else:
-        source.refuse(
-            wording.SKIN_INFLUENCE_COUNT,
-            int(words.offsets[head]),
-            len(vertices),
-            "weights",
-            vertices,
-            vertex=vertex,
-            found=quoted(words.word(head)),
-        )
+        values = {"pairs": bare(words.word(head)), "found": int(after[vertex]) - head - 1}
+    offset, count = int(words.offsets[head]), len(vertices)
+    source.refuse(key, offset, count, "weights", vertices, vertex=vertex, **values)
 
 
 def _faulty_pairs(
