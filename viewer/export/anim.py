@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import check_gaps, filled, gaps_note
@@ -54,7 +54,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         notes += _losses(animation, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
             notes.append(
-                Diagnostic(
+                note(
                     "X003.clip-placement: the placement of the whole figure is not part of its "
                     "clip and is omitted"
                 )
@@ -171,15 +171,14 @@ def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:
 
 
 def _summary(path: Path, clip: Clip, how: Phrase | str) -> Diagnostic:
-    values = {
-        "channels": counted(len(clip.channels), "channel"),
-        "keys": counted(sum(len(channel.times) for channel in clip.channels), "key"),
-        "start": float(clip.start),
-        "end": float(clip.end),
-        "how": optional(", {}", how),
-    }
-    return Diagnostic(
-        "X001.anim: {channels} with {keys}, {start:zg} to {end:zg} s{how}", path, values=values
+    return note(
+        "X001.anim: {channels} with {keys}, {start:zg} to {end:zg} s{how}",
+        path,
+        channels=counted(len(clip.channels), "channel"),
+        keys=counted(sum(len(channel.times) for channel in clip.channels), "key"),
+        start=float(clip.start),
+        end=float(clip.end),
+        how=optional(", {}", how),
     )
 
 
@@ -189,10 +188,10 @@ def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:
         notes.append(
-            Diagnostic(
+            note(
                 "X003.clip-scale: .anim cannot store the figure's scale of {scale:g}, which is "
                 "omitted",
-                values={"scale": float(scales.max())},
+                scale=float(scales.max()),
             )
         )
     notes += joint_scales_note(
@@ -204,18 +203,17 @@ def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:
         length = length_text(figure, float(moved))
-        values = {"length": length, "distance": float(moved), "unit": figure.unit}
         notes.append(
-            Diagnostic(
+            note(
                 "X003.clip-translations: .anim translates only the root: translations of other "
                 "joints, up to {length}, are omitted",
-                values=values,
+                length=length,
+                distance=float(moved),
+                unit=figure.unit,
             )
         )
     if frames.shape_weights.any():
         notes.append(
-            Diagnostic(
-                "X003.clip-shape: .anim cannot store a shape: blend shape weights are omitted"
-            )
+            note("X003.clip-shape: .anim cannot store a shape: blend shape weights are omitted")
         )
     return notes

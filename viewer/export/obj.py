@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
@@ -56,11 +56,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     losses = PoseLosses(actor.figure, skinning)
     odd, textures = _write(actor, path, skinning, losses)
     figure, mesh = actor.figure, actor.figure.require_mesh()
-    counts = {
-        "vertices": counted(mesh.n_vertices, "vertex"),
-        "triangles": counted(mesh.n_triangles, "triangle"),
-    }
-    notes = [Diagnostic(wording.MESH, path, values=counts), *textures, *odd, *losses.notes(path)]
+    notes = [
+        note(
+            wording.MESH,
+            path,
+            vertices=counted(mesh.n_vertices, "vertex"),
+            triangles=counted(mesh.n_triangles, "triangle"),
+        ),
+        *textures,
+        *odd,
+        *losses.notes(path),
+    ]
     return notes + _changed(figure)
 
 
@@ -79,9 +85,7 @@ def _export_frames(
             odd += _write(actor, file, options.skinning, losses, frame)[0]
     if not files:
         return [
-            Diagnostic(
-                "X001.no-meshes: no person is present in these frames: nothing was written", path
-            )
+            note("X001.no-meshes: no person is present in these frames: nothing was written", path)
         ]
     values = {
         "n": len(files),
@@ -95,7 +99,7 @@ def _export_frames(
         else "X001.one-mesh: 1 file, {first}{missing}"
     )
     errors = losses.notes(path, animation.first_frame)
-    written = Diagnostic(key, path, values=values)
+    written = note(key, path, **values)
     return [written, *filling, *odd[:1], *errors, *_changed(figure)]
 
 
@@ -137,7 +141,7 @@ def _write(
         n_lines = 2 * mesh.n_vertices + n_uvs + mesh.n_triangles
         save_parts(path, [first, library.encode(), text], n_lines)
     return odd, [
-        Diagnostic("X001.texture: its texture", file) for file in beside if file.suffix == ".png"
+        note("X001.texture: its texture", file) for file in beside if file.suffix == ".png"
     ]
 
 
@@ -147,10 +151,10 @@ def _changed(figure: Figure) -> list[Diagnostic]:
     polygons = dict(figure.facts).get("polygons")
     if polygons is not None:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.polygons: polygons of the original file are written as triangles "
                 "({polygons})",
-                values={"polygons": polygons},
+                polygons=polygons,
             )
         )
     renamed = [
@@ -160,13 +164,11 @@ def _changed(figure: Figure) -> list[Diagnostic]:
     ]
     if renamed:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.material-names: {n} another name in the file, because names must be unique: "
                 "{names}",
-                values={
-                    "n": counted(len(renamed), "material", "has", "have"),
-                    "names": listed(renamed, 8),
-                },
+                n=counted(len(renamed), "material", "has", "have"),
+                names=listed(renamed, 8),
             )
         )
     lost = _library_losses(mesh)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._losses.pose_errors import mesh_losses
@@ -63,10 +63,10 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     }
     lost = [Phrase("materials and textures")] if mesh.materials else []
     lost += surface_parts(mesh, has_colors=True)
-    notes = [Diagnostic(wording.MESH, path, values=counts), *errors]
+    notes = [note(wording.MESH, path, **counts), *errors]
     if kind == "double":
         notes.append(
-            Diagnostic(
+            note(
                 "X005.double-positions: positions are written in double precision: single "
                 "precision would move vertices by more than a millionth of the size",
                 path,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._left_out import extra_parts, not_held_note
@@ -52,9 +52,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     course, rig, sources = _as_rig(actor, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     rig = _with_picture_names(rig, skin)
-    notes = [
-        Diagnostic("X001.skel: {n}", skel, values={"n": counted(figure.skeleton.n_joints, "joint")})
-    ]
+    notes = [note("X001.skel: {n}", skel, n=counted(figure.skeleton.n_joints, "joint"))]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
         if rig.mesh is not None:
@@ -62,12 +60,11 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         files = [Source(file, saved[file]) for file in (skel, skin) if file in saved]
         error = _error(actor, files, sources, skinning)
     if rig.mesh is not None:
-        notes.append(
-            Diagnostic("X001.skin: {n}", skin, values={"n": counted(rig.mesh.n_vertices, "vertex")})
-        )
+        notes.append(note("X001.skin: {n}", skin, n=counted(rig.mesh.n_vertices, "vertex")))
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
-            counts = {"before": figure.mesh.n_vertices, "after": rig.mesh.n_vertices}
-            notes.append(Diagnostic(wording.SEAMS, values=counts))
+            notes.append(
+                note(wording.SEAMS, before=figure.mesh.n_vertices, after=rig.mesh.n_vertices)
+            )
     return notes + _changed(actor, course) + _lost(figure) + error
 
 
@@ -162,30 +159,29 @@ def _changed(actor: Actor, course: _CourseSkeleton) -> list[Diagnostic]:
     ):
         if joints:
             n = len(joints)
-            values = {
-                "n": counted(n, "joint", "has", "have"),
-                "joints": Shown(counted(n, "joint")),
-                "names": listed([joint_label(skeleton, joint) for joint in joints], 8),
-                "their": agree(n, "its", "their"),
-            }
-            notes.append(Diagnostic(key, values=values))
+            notes.append(
+                note(
+                    key,
+                    n=counted(n, "joint", "has", "have"),
+                    joints=Shown(counted(n, "joint")),
+                    names=listed([joint_label(skeleton, joint) for joint in joints], 8),
+                    their=agree(n, "its", "their"),
+                )
+            )
     if (np.abs(actor.require_pose().scales - 1.0) > _ROUNDED).any():
         notes.append(
-            Diagnostic(
+            note(
                 "X005.skel-scaled: joints are scaled, which .skel cannot store: the bindings of "
                 "the .skin scale the vertices, and bones keep their lengths when the file is posed"
             )
         )
     if course.renamed:
-        values = {
-            "n": counted(len(course.renamed), "joint name", "is", "are"),
-            "names": listed(course.renamed, 8),
-        }
         notes.append(
-            Diagnostic(
+            note(
                 "X005.skel-names: {n} changed, because .skel has no braces or keywords in names: "
                 "{names}",
-                values=values,
+                n=counted(len(course.renamed), "joint name", "is", "are"),
+                names=listed(course.renamed, 8),
             )
         )
     return notes

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source, unreadable
@@ -390,7 +390,10 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
             notes: list[Diagnostic] = import_module(f"{__name__}.{key}").write(content, path)
             return notes
     known = list(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
-    values = {"suffix": suffix, "known": listed(known, 12)}
     raise UnsupportedFormatError(
-        Diagnostic('F002.no-writer: no writer for "{suffix}"; supported: {known}', values=values)
+        note(
+            'F002.no-writer: no writer for "{suffix}"; supported: {known}',
+            suffix=suffix,
+            known=listed(known, 12),
+        )
     )

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic, Phrase, frame_range
+from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.phrases import agree, counted, listed, optional
@@ -44,17 +44,14 @@ def gap_notes(source: Source, lost: Mapping[int | None, NDArray[np.integer]]) ->
     if not frames:
         return []
     count = sum(map(len, lost.values()))
-    values = {
-        "n": counted(count, "frame"),
-        "frames": listed(frames),
-        "problem": _problem(source),
-        "are": agree(count, "is a gap", "are gaps"),
-    }
     return [
-        Diagnostic(
+        note(
             "F007.frames-lost: {n} with invalid numbers {are}: {frames}; first error: {problem}",
             source.path,
-            values=values,
+            n=counted(count, "frame"),
+            frames=listed(frames),
+            problem=_problem(source),
+            are=agree(count, "is a gap", "are gaps"),
         )
     ]
 

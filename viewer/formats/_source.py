@@ -14,7 +14,7 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.diagnostics import Collector, Diagnostic, Part, Phrase, wording
+from viewer.diagnostics import Collector, Diagnostic, Part, Phrase, note, wording
 from viewer.errors import FormatError
 from viewer.formats._text.numbers import word_begins
 from viewer.interrupts import raising
@@ -443,12 +443,15 @@ def _kind_of(path: Path, max_size: int) -> str | None:
     if not stat.S_ISREG(status.st_mode):
         return _KINDS.get(stat.S_IFMT(status.st_mode), "an unknown kind of file")
     if status.st_size > max_size:
-        values = {
-            "most": max_size,
-            "size": status.st_size,
-            "remedy": Remedy("", " (see --max-size)"),
-        }
-        raise FormatError(Diagnostic(wording.TOO_LARGE, path, values=values))
+        raise FormatError(
+            note(
+                wording.TOO_LARGE,
+                path,
+                most=max_size,
+                size=status.st_size,
+                remedy=Remedy("", " (see --max-size)"),
+            )
+        )
     return None
 
 
@@ -473,13 +476,13 @@ def _read_pipe(path: Path, max_size: int) -> bytes | None:
                     parts.append(part)
                     size += len(part)
                     if size > max_size:
-                        values = {"most": max_size, "remedy": Remedy("", " (see --max-size)")}
                         raise FormatError(
-                            Diagnostic(
+                            note(
                                 "F001.pipe-too-large: expected at most {most:,.0f} bytes, found "
                                 "more{remedy}",
                                 path,
-                                values=values,
+                                most=max_size,
+                                remedy=Remedy("", " (see --max-size)"),
                             )
                         )
         except OSError as problem:
@@ -523,18 +526,17 @@ def _unreadable(path: Path, problem: Exception) -> FormatError:
 def unreadable(path: Path, reason: object, near: str = "") -> FormatError:
     """Return the error for a file that cannot be read."""
     return FormatError(
-        Diagnostic(
+        note(
             "F001.unreadable: cannot be read: {reason}{near}",
             path,
-            values={"reason": str(reason), "near": optional("; {}", near)},
+            reason=str(reason),
+            near=optional("; {}", near),
         )
     )
 
 
 def _no_file(path: Path, kind: str) -> FormatError:
-    return FormatError(
-        Diagnostic("F001.no-file: expected a file, found {found}", path, values={"found": kind})
-    )
+    return FormatError(note("F001.no-file: expected a file, found {found}", path, found=kind))
 
 
 def _near_files(path: Path) -> str:

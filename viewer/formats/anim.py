@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Part, Phrase, wording
+from viewer.diagnostics import Diagnostic, Part, Phrase, note, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.joint_parser import Word, WordParser
@@ -329,12 +329,10 @@ class _Parser(WordParser):
 def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     """Write a clip with a channel per DOF, in the order of the DOFs."""
     if not isinstance(clip, Clip):
-        raise UnsupportedFormatError(
-            Diagnostic("F002.anim-figure: .anim stores a clip, not a figure")
-        )
+        raise UnsupportedFormatError(note("F002.anim-figure: .anim stores a clip, not a figure"))
     if [channel.target for channel in clip.channels] != list(range(len(clip.channels))):
         raise UnsupportedFormatError(
-            Diagnostic("F002.anim-order: .anim needs one channel per DOF, in the order of the DOFs")
+            note("F002.anim-order: .anim needs one channel per DOF, in the order of the DOFs")
         )
     head = f"animation {{\n\trange {clip.start!r} {clip.end!r}\n"
     head += f"\tnumchannels {len(clip.channels)}\n"

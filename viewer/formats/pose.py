@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
@@ -138,11 +138,11 @@ def _archive_values(source: Source) -> _NamedValues:
         labels = both.array("dof_names", "U", Phrase("names"))
         numbers = both.array("dofs", "iuf", Phrase("numbers"))
         if labels.ndim != 1 or labels.shape != numbers.shape:
-            sizes = {"expected": numbers.size, "found": labels.size}
             raise source.fault(
                 "F002.pose-names: {item}: expected {expected} names to match dofs, found {found}",
                 item="dof_names",
-                **sizes,
+                expected=numbers.size,
+                found=labels.size,
             )
         values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
     return _NamedValues(source, values)
@@ -566,7 +566,7 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
         line = record.line_of(problem.part, problem.name)
     found = problem.diagnostic
     if found is None:
-        found = Diagnostic("F002.pose-misfit: {problem}", values={"problem": str(problem)})
+        found = note("F002.pose-misfit: {problem}", problem=str(problem))
     return FormatError(replace(found, path=path, line=line))
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Part, Phrase, wording
+from viewer.diagnostics import Diagnostic, Part, Phrase, note, wording
 from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.joint_parser import JointParser, Word, called_joint
@@ -321,7 +321,7 @@ def _check_names(skeleton: Skeleton) -> None:
 
 
 def _unsupported(key: str, **values: object) -> UnsupportedFormatError:
-    return UnsupportedFormatError(Diagnostic(key, values=values))
+    return UnsupportedFormatError(note(key, **values))
 
 
 def _lines(skeleton: Skeleton) -> list[str]:

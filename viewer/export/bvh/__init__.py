@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.export._exporter import SampledParts, Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note
@@ -301,21 +301,18 @@ class _File:
         """Return a note about the contents of the file."""
         writer, options = self._writer, self._writer.options
         is_known = writer.figure.unit in METRES
-        values = {
-            "joints": counted(len(writer.names), "joint"),
-            "rest": optional("{} and ", Phrase("the rest pose") if options.rest_frame else ""),
-            "frames": frames_phrase(writer.first.first_frame + self._span[0], self._n_frames),
-            "rate": writer.first.frame_rate,
-            "unit": UNIT_NAMES[options.unit or _DEFAULT_UNIT]
-            if is_known
-            else Phrase("the figure's unit"),
-            "up": options.up or "y",
-            "order": options.rotation_order.upper(),
-        }
-        return Diagnostic(
+        return note(
             "X001.bvh: {joints}, {rest}{frames} at {rate:g} fps, {unit}, {up} up, channels {order}",
             self.path,
-            values=values,
+            joints=counted(len(writer.names), "joint"),
+            rest=optional("{} and ", Phrase("the rest pose") if options.rest_frame else ""),
+            frames=frames_phrase(writer.first.first_frame + self._span[0], self._n_frames),
+            rate=writer.first.frame_rate,
+            unit=UNIT_NAMES[options.unit or _DEFAULT_UNIT]
+            if is_known
+            else Phrase("the figure's unit"),
+            up=options.up or "y",
+            order=options.rotation_order.upper(),
         )
 
 
@@ -326,40 +323,37 @@ def _remarks(writer: _Writer) -> list[Diagnostic]:
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.common-root: several roots: a common parent joint {joint} was added",
-                values={"joint": brief(skeleton.names[0])},
+                joint=brief(skeleton.names[0]),
             )
         )
     notes += _names_notes(skeleton.names, writer.names)
     notes += gaps_note(frames.present, animation.first_frame, options.closing)
     if figure.unit not in METRES and options.unit:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.unit-unknown: lengths are unchanged: the unit of {figure} is unknown",
-                values={"figure": figure.name},
+                figure=figure.name,
             )
         )
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(writer.moves)]
     if moving:
-        values = {
-            "n": counted(len(moving), "joint"),
-            "names": listed(moving, 8),
-            "translate": agree(len(moving), "translates and has", "translate and have"),
-        }
         notes.append(
-            Diagnostic(
+            note(
                 "X005.position-channels: {n} below the root {translate} position channels: {names}",
-                values=values,
+                n=counted(len(moving), "joint"),
+                names=listed(moving, 8),
+                translate=agree(len(moving), "translates and has", "translate and have"),
             )
         )
     if shape_changes(frames):
         first = writer.reference + animation.first_frame
         notes.append(
-            Diagnostic(
+            note(
                 "X005.shape-changes: the shape changes over time: bone lengths are those of frame "
                 "{frame}",
-                values={"frame": first},
+                frame=first,
             )
         )
     notes += joint_scales_note(
@@ -371,12 +365,13 @@ def _remarks(writer: _Writer) -> list[Diagnostic]:
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
         low, high, first_scale = map(float, (scales.min(), scales.max(), scales[0]))
-        sizes = {"low": low, "high": high, "first": first_scale}
         notes.append(
-            Diagnostic(
+            note(
                 "X005.scale-changes: the figure's scale changes from {low:g} to {high:g}: bone "
                 "lengths are written with {first:g}",
-                values=sizes,
+                low=low,
+                high=high,
+                first=first_scale,
             )
         )
     return notes
@@ -392,25 +387,24 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
     ]
     if pairs:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.joints-renamed: {n} changed: {pairs}",
-                values={"n": counted(len(pairs), "joint name"), "pairs": listed(pairs, 8)},
+                n=counted(len(pairs), "joint name"),
+                pairs=listed(pairs, 8),
             )
         )
     odd = [_visible(name) for name in odd_names(written)]
     if odd:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.odd-names: some programs cannot read {n} that {are} empty or repeated, or "
                 "{have} spaces or characters outside ASCII: {names}; {remedy} changes {them}",
-                values={
-                    "n": counted(len(odd), "joint name"),
-                    "names": listed(odd, 8),
-                    "are": agree(len(odd), "is", "are"),
-                    "have": agree(len(odd), "has", "have"),
-                    "remedy": Remedy("Safe names in the Export motion dialog", "--safe-names"),
-                    "them": agree(len(odd), "it", "them"),
-                },
+                n=counted(len(odd), "joint name"),
+                names=listed(odd, 8),
+                are=agree(len(odd), "is", "are"),
+                have=agree(len(odd), "has", "have"),
+                remedy=Remedy("Safe names in the Export motion dialog", "--safe-names"),
+                them=agree(len(odd), "it", "them"),
             )
         )
     return notes

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._placeholders import neutral_corners, neutral_positions
 from viewer.formats._polygons import filled_normals
@@ -298,12 +298,11 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     save_parts(path, chain.from_iterable(parts), n_tables * mesh.n_vertices + mesh.n_triangles)
     notes = []
     if len(sources) != figure.mesh.n_vertices:
-        counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}
-        notes.append(Diagnostic(wording.SEAMS, Path(path), values=counts))
-    if lost := lost_parts(mesh):
         notes.append(
-            Diagnostic(wording.PARTS, Path(path), values={"format": ".skin", "parts": all_of(lost)})
+            note(wording.SEAMS, Path(path), before=figure.mesh.n_vertices, after=mesh.n_vertices)
         )
+    if lost := lost_parts(mesh):
+        notes.append(note(wording.PARTS, Path(path), format=".skin", parts=all_of(lost)))
     return notes
 
 
