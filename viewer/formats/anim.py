@@ -80,7 +80,7 @@ class _Parser(WordParser):
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
-                raise self.fault("F002.anim-item: {where}: expected a channel, found {found}")
+                raise self.fault_here("F002.anim-item: {where}: expected a channel, found {found}")
         self.channel, found = None, len(channels)
         if self.word is None:
             self.source.warn(wording.CLOSING)
@@ -148,14 +148,14 @@ class _Parser(WordParser):
                 extrapolation = (self._mode(), self._mode())
             elif text == b"keys":
                 if rows is not None:
-                    raise self.fault(
+                    raise self.fault_here(
                         "F002.anim-keys-again: {where}: expected a single list of keys, found a "
                         "second one"
                     )
                 self.advance()
                 rows = self._keys()
             else:
-                raise self.fault(
+                raise self.fault_here(
                     "F002.anim-channel-item: {where}: expected extrapolate or keys, found {found}"
                 )
         self._expect(b"}")
@@ -240,7 +240,7 @@ class _Parser(WordParser):
         begins = optional(" ({})", self._begins())
         return {"where": self._where(), "found": quoted(self.text), "begins": begins, **own}
 
-    def fault(self, key: str, **values: object) -> FormatError:
+    def fault_here(self, key: str, **values: object) -> FormatError:
         """Return the exception for an error at the current word that stops parsing."""
         return self.source.fault(key, self.place, **self._values(values))
 
@@ -254,7 +254,7 @@ class _Parser(WordParser):
     def _expect(self, text: bytes) -> None:
         if self.text != text:
             looks = self.source.looks_like() if text == b"animation" else None
-            raise self.fault(
+            raise self.fault_here(
                 'F002.anim-word: {where}: expected "{expected}", found {found}{looks}{begins}',
                 expected=text.decode(),
                 looks=optional(" ({})", looks),
@@ -264,7 +264,7 @@ class _Parser(WordParser):
     def _number(self, item: str, of_key: bool = False) -> float:
         """Read a number; NaN if it belongs to a key and is invalid."""
         if self.word is None:
-            raise self.fault(
+            raise self.fault_here(
                 "F002.anim-end: {item}: expected a number, found the end of the file{begins}",
                 item=self._item(item),
             )
@@ -272,7 +272,7 @@ class _Parser(WordParser):
         value = to_number(word)
         if value is None:
             if not of_key or word in (b"{", b"}"):
-                raise self.fault(number_key(word), item=self._item(item))
+                raise self.fault_here(number_key(word), item=self._item(item))
             self._refuse(number_key(word), item=self._item(item))
             value = math.nan
         elif item == "value" and abs(value) > FARTHEST:
@@ -291,7 +291,7 @@ class _Parser(WordParser):
         left = len(self.source.data) - (word.end() if word else 0)
         if value != int(value) or value < 0 or value * _WORDS_PER_KEY > left:
             self.word = word
-            raise self.fault(
+            raise self.fault_here(
                 "F002.anim-count: {item}: expected a count that fits the file, found {found} with "
                 "{left} bytes left",
                 item=self._item(item),
@@ -302,7 +302,7 @@ class _Parser(WordParser):
     def _mode(self) -> Extrapolation:
         mode = _MODES.get(self.keyword)
         if mode is None:
-            raise self.fault(
+            raise self.fault_here(
                 "F002.anim-mode: {where}: extrapolate: expected one of {modes}, found "
                 "{found}{begins}",
                 modes=listed(EXTRAPOLATIONS),
@@ -319,7 +319,7 @@ class _Parser(WordParser):
                 "{found}{begins}"
             )
             if self.word is None or text in (b"{", b"}"):
-                raise self.fault(message, rules=listed(TANGENT_RULES))
+                raise self.fault_here(message, rules=listed(TANGENT_RULES))
             self._refuse(message, rules=listed(TANGENT_RULES))
             tangent = "smooth"
         self.advance()

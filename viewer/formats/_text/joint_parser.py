@@ -48,7 +48,7 @@ class WordParser:
         """Offset of the current word, or of the end of the file."""
         return self.source.end if self.word is None else self.word.start()
 
-    def fault(self, key: str, **values: object) -> FormatError:
+    def fault_here(self, key: str, **values: object) -> FormatError:
         """Return the exception for an error at the current word."""
         return self.source.fault(key, self.place, found=quoted(self.text), **values)
 
@@ -100,7 +100,7 @@ class JointParser(WordParser, Generic[Joint]):
         """Return the exception for a joint that is not closed at the current word."""
         joint = self.found[self.open[-1]]
         line = self.source.line(joint.start)
-        return self.fault(wording.JOINT_OPEN, joint=joint.called, line=line)
+        return self.fault_here(wording.JOINT_OPEN, joint=joint.called, line=line)
 
     def refuse_numbers(
         self,

@@ -56,7 +56,7 @@ class _Parser(JointParser[BvhJoint]):
     def hierarchy(self) -> tuple[list[BvhJoint], int]:
         """Return the joints and the offset of the motion."""
         if self.keyword != b"HIERARCHY":
-            raise self.fault(
+            raise self.fault_here(
                 "F002.bvh-start: expected HIERARCHY, found {found}{looks}",
                 looks=optional(" ({})", self.source.looks_like()),
             )
@@ -66,7 +66,7 @@ class _Parser(JointParser[BvhJoint]):
         if self.open:
             raise self.still_open()
         if not self.found:
-            raise self.fault("F002.bvh-no-root: expected ROOT, found {found}")
+            raise self.fault_here("F002.bvh-no-root: expected ROOT, found {found}")
         if self.extra_braces:
             self.source.warn(wording.EXTRA_BRACES, n=self.extra_braces)
         if self.doubled:
@@ -90,7 +90,7 @@ class _Parser(JointParser[BvhJoint]):
             self.leave()
         elif joint is None:
             if keyword != b"ROOT":
-                raise self.fault("F002.bvh-root: expected ROOT or MOTION, found {found}")
+                raise self.fault_here("F002.bvh-root: expected ROOT or MOTION, found {found}")
             self._open_joint()
         elif keyword == b"OFFSET":
             self._offset(joint)
@@ -103,12 +103,12 @@ class _Parser(JointParser[BvhJoint]):
         elif keyword in (b"MOTION", b"ROOT"):
             raise self.still_open()
         elif joint.is_end:
-            raise self.fault(
+            raise self.fault_here(
                 'F002.bvh-end-item: {joint}: expected OFFSET or "}}", found {found}',
                 joint=joint.called,
             )
         else:
-            raise self.fault(
+            raise self.fault_here(
                 "F002.bvh-item: {joint}: expected OFFSET, CHANNELS, JOINT, End Site or "
                 '"}}", found {found}',
                 joint=joint.called,
@@ -152,7 +152,7 @@ class _Parser(JointParser[BvhJoint]):
         assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.offset is not None:
-            raise self.fault(
+            raise self.fault_here(
                 "F002.bvh-offset-again: {joint}: expected one OFFSET, found a second one",
                 joint=joint.called,
             )
@@ -181,7 +181,7 @@ class _Parser(JointParser[BvhJoint]):
         assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.channels is not None:
-            raise self.fault(
+            raise self.fault_here(
                 "F002.bvh-channels-again: {joint}: expected one CHANNELS, found a second one",
                 joint=joint.called,
             )
@@ -189,20 +189,20 @@ class _Parser(JointParser[BvhJoint]):
         item = Phrase("{item} of {owner}", item="CHANNELS", owner=joint.called)
         count = self.number
         if count is None or count != int(count) or count < 0:
-            raise self.fault(wording.COUNT, item=item)
+            raise self.fault_here(wording.COUNT, item=item)
         stated = self.word
         self.advance()
         codes: list[int] = []
         while self.word is not None and self.keyword not in self.ends:
             code = CHANNELS.get(self.keyword)
             if code is None:
-                raise self.fault(
+                raise self.fault_here(
                     "F002.bvh-channel: {item}: expected a channel name (Xposition … Zrotation), "
                     "found {found}",
                     item=item,
                 )
             if code < 3 and code in codes:
-                raise self.fault(
+                raise self.fault_here(
                     "F002.bvh-position-again: {item}: expected each position channel once, found "
                     "{found} again",
                     item=item,
