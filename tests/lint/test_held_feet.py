@@ -59,6 +59,17 @@ def test_locked_feet_of_a_capture_do_not_slide(name, tmp_path):
     assert slides(scene) == []
 
 
+def test_feet_of_short_legs_do_not_slide_where_those_of_the_motion_are_lifted(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    knight = shared_data / "rigging" / "animated" / "kk_knight.glb"
+    scene = load(path_of("kneel", tmp_path), knight)
+    (actor,) = scene.actors
+    assert any(note.key == "F007.feet-planted" for note in scene.diagnostics)
+    actor.figure = replace(actor.figure, animations=())  # other motions of its file
+    assert slides(scene) == []
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_feet_on_a_treadmill_are_held_under_noise(seed, tmp_path):
     scene = load(path_of("treadmill", tmp_path), bundled_body(), motion=MotionSettings(feet=False))

@@ -48,6 +48,10 @@ second above the ground, not on a step."""
 SUNK = 0.015
 """Depth to which the source's feet may sink before a planted foot follows them."""
 
+CLEARS = 0.03
+"""Height to which a foot is lifted, if its source's is, while no other foot stands: more than
+``TOUCHES``, so that it does not slide on the ground."""
+
 # Moving ground, as on a treadmill or where the travel was removed from a motion.
 
 GROUND_WINDOWS = (WINDOW, 0.3)

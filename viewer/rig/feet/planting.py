@@ -57,7 +57,7 @@ _EXTENDED = 0.97
 
 # Longer beginnings and ends of contacts, seconds, tried one after the other while knees grow by
 # more than a factor of _CALM. Six recordings stay at 1.06 without any: 1.15 is beyond such chance,
-# and too little to be seen. Kneeling, in which feet are lifted far, falls from 1.29 to 1.03 with
+# and too little to be seen. Kneeling, in which feet are lifted far, falls from 1.39 to 1.00 with
 # 0.1 s. Beyond 0.2 s, a third of a step of 0.6 s at either end, nothing of it would be held.
 _EASES, _CALM = (0.1, 0.2), 1.15
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
@@ -279,7 +279,10 @@ class _FootPlan:
         return largest
 
     def floor(self, foot: int) -> Floats:
-        """Return the height (N,) below which a foot must not sink: the lower contact around it."""
+        """Return the height (N,) below which a foot must not sink: the lower contact around it.
+
+        It is higher in the air, while no other foot stands.
+        """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))
         after = np.searchsorted([contact.start for contact in contacts], rows, side="right")
@@ -290,7 +293,15 @@ class _FootPlan:
         lowest = np.minimum(levels[before], levels[after])
         # Where the source's foot itself sinks below this ground, the limit follows it.
         sunk = np.minimum(stands[before], stands[after]) - path.lowest(self.up)
-        return lowest - np.maximum(sunk - limits.SUNK * self.size, 0.0)
+        lowest -= np.maximum(sunk - limits.SUNK * self.size, 0.0)
+        # While no other foot stands, as of a person who kneels down, a foot that the source lifts
+        # must not slide on the ground instead: it is lifted as well. Its limit follows a curve of
+        # 0.06 s, as the knee would follow a sudden one: kneeling, it accelerates by 1.3 instead of
+        # 1.2 times as much as the source's. A curve of 0.15 s allows it to slide.
+        is_alone = 1.0 - np.delete(self.holds(), foot, axis=1).max(axis=1, initial=0.0)
+        raised = (is_alone * np.clip(-sunk, 0.0, limits.CLEARS * self.size))[:, None]
+        smooth = _smoothed(self, raised, np.ones(len(raised)), _LEVELS)
+        return lowest + np.minimum(raised, smooth)[:, 0]
 
 
 def _foot_plan(
@@ -453,9 +464,9 @@ _GAP = 0.0007
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 
 # Number of passes that lift sinking feet, and their weight relative to the stiffness s^4 of the
-# curves. Without any, a foot of the short legs sinks by 11 % of the body; one pass leaves 0.04 %,
-# three 0.008 %, seven 0.001 % (0.02 mm). A stronger pull needs fewer, but makes a kink where the
-# foot would have touched the ground: knees of kneeling grow by 1.3 at 0.25, 1.5 at 1, 1.9 at 4.
+# curves. Without any, a foot of the short legs sinks by 13 % of the body; one pass leaves 0.13 %,
+# three 0.05 %, seven 0.015 % (0.3 mm). A stronger pull needs fewer, but makes a kink where the foot
+# would have touched the ground: knees of kneeling grow by 1.3 at 0.25 and by 2.2 at 4.
 _LIFTS, _LIFTED = 7, 0.25
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
 
