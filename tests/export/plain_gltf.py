@@ -1,4 +1,4 @@
-"""A small glTF 2.0 reader that shares no code with the viewer.
+"""A glTF 2.0 file as the exporters must write it, read without code of the viewer.
 
 It checks the rules of the specification and evaluates vertices and joints in double precision.
 """
@@ -7,35 +7,27 @@ import json
 import math
 import struct
 from pathlib import Path
-from urllib.parse import unquote
 
 import numpy as np
+from formats.gltf.spec_evaluator import FORMATS, SIZES, Evaluator
 
-FORMATS = {5121: ("u1", 1), 5123: ("<u2", 2), 5125: ("<u4", 4), 5126: ("<f4", 4)}
-SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNIT = 1e-6  # rounding of four single-precision components
 SIDES = {"POSITION": "VEC3", "NORMAL": "VEC3", "TEXCOORD_0": "VEC2", "TEXCOORD_1": "VEC2"}
 
 
-class Gltf:
+class Gltf(Evaluator):
     """A file that is checked against every rule when it is opened."""
 
     def __init__(self, path: Path) -> None:
         data = path.read_bytes()
-        self.buffer = b""
-        text = self._chunks(data) if data[:4] == b"glTF" else data
-        self.root = json.loads(text.decode("utf-8"), parse_constant=lambda word: 1 / 0)
-        if data[:4] != b"glTF" and "buffers" in self.root:
-            uri = self.root["buffers"][0]["uri"]
-            self.buffer = (path.parent / unquote(uri, errors="surrogateescape")).read_bytes()
-            assert len(self.buffer) == self.root["buffers"][0]["byteLength"]
-        self.nodes = self.root["nodes"]
-        self.parents = {
-            child: n for n, x in enumerate(self.nodes) for child in x.get("children", [])
-        }
+        if data[:4] == b"glTF":
+            self._check_chunks(data)
+        super().__init__(path)
+        self.buffer = self.buffer_bytes(0) if "buffers" in self.root else b""
+        assert data[:4] == b"glTF" or len(self.buffer) == self._declared(self.root)
         self._check()
 
-    def _chunks(self, data: bytes) -> bytes:
+    def _check_chunks(self, data: bytes) -> None:
         magic, version, length = struct.unpack_from("<4sII", data)
         assert (magic, version, length) == (b"glTF", 2, len(data))
         size, kind = struct.unpack_from("<I4s", data, 12)
@@ -44,24 +36,24 @@ class Gltf:
         if place < len(data):
             size, kind = struct.unpack_from("<I4s", data, place)
             assert kind == b"BIN\0" and size % 4 == 0 and place + 8 + size == len(data)
-            self.buffer = data[place + 8 :]
-            declared = json.loads(text)["buffers"][0]
-            assert "uri" not in declared and 0 <= size - declared["byteLength"] <= 3
-        return text
+            root = json.loads(text)
+            assert "uri" not in root["buffers"][0] and 0 <= size - self._declared(root) <= 3
+
+    def _declared(self, root: dict) -> int:
+        return root["buffers"][0]["byteLength"] if "buffers" in root else 0
 
     # Contents of the file
 
     def accessor(self, index: int) -> np.ndarray:
-        """Return an array: (N,) for scalars, otherwise (N, components)."""
+        """Return an array as it is stored: (N,) for scalars, otherwise (N, components)."""
         item = self.root["accessors"][index]
         view = self.root["bufferViews"][item["bufferView"]]
-        dtype, size = FORMATS[item["componentType"]]
-        width = SIZES[item["type"]]
-        start = view["byteOffset"] + item.get("byteOffset", 0)
-        assert start % size == 0 and item["count"] >= 1
-        assert item.get("byteOffset", 0) + item["count"] * width * size <= view["byteLength"]
-        flat = np.frombuffer(self.buffer, dtype, item["count"] * width, start)
-        rows = flat.reshape(item["count"], width)
+        kind, width = np.dtype(FORMATS[item["componentType"]]), SIZES[item["type"]]
+        assert item["componentType"] in (5121, 5123, 5125, 5126)
+        assert (view["byteOffset"] + item.get("byteOffset", 0)) % kind.itemsize == 0
+        size = item["count"] * width * kind.itemsize
+        assert item["count"] >= 1 and item.get("byteOffset", 0) + size <= view["byteLength"]
+        rows = self.rows(item, kind, width, item["count"])
         assert rows.dtype.kind != "f" or np.isfinite(rows).all()
         for name, least in (("min", rows.min(axis=0)), ("max", rows.max(axis=0))):
             assert item.get(name, least.tolist()) == least.tolist()
@@ -101,52 +93,25 @@ class Gltf:
 
     def transforms(self, time: float | None = None) -> list[dict]:
         """Return the local transform of every node, animated if a time is given."""
-        nodes = [dict(node) for node in self.nodes]
-        for channel in self.root["animations"][0]["channels"] if time is not None else ():
-            sampler = self.root["animations"][0]["samplers"][channel["sampler"]]
-            times = self.accessor(sampler["input"]).astype(float)
-            target = channel["target"]
-            output = self.accessor(sampler["output"]).astype(float).reshape(len(times), -1)
-            nodes[target["node"]][target["path"]] = line(
-                times, output, time, target["path"] == "rotation"
-            )
-        return nodes
+        return self.posed(None if time is None else 0, time or 0.0)
 
     def world(self, time: float | None = None) -> np.ndarray:
         """Return the world matrix of every node, (N, 4, 4)."""
-        nodes = self.transforms(time)
-        local = [matrix(node) for node in nodes]
-        result = []
-        for node in range(len(nodes)):
-            whole, above = local[node], self.parents.get(node)
-            while above is not None:
-                whole, above = local[above] @ whole, self.parents.get(above)
-            result.append(whole)
-        return np.array(result)
+        return self.worlds(self.transforms(time))
 
     def vertices(self, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return morphed and skinned positions and normals in world space."""
-        node = self.transforms(time)[self.mesh_node]
+        nodes = self.transforms(time)
         positions = self.attribute("POSITION").astype(float)
         normals = self.attribute("NORMAL").astype(float)
         given = self.root["meshes"][0].get("weights", ())
-        weights = node.get("weights", given)
+        weights = nodes[self.mesh_node].get("weights", given)
         for weight, target in zip(weights, self.primitives[0].get("targets", ()), strict=True):
             positions = positions + weight * self.accessor(target["POSITION"])
             if "NORMAL" in target:
                 normals = normals + weight * self.accessor(target["NORMAL"])
-        world = self.world(time)
-        if "skin" not in node:
-            whole = np.broadcast_to(world[self.mesh_node], (len(positions), 4, 4))
-        else:
-            skin = self.root["skins"][node["skin"]]
-            bound = self.accessor(skin["inverseBindMatrices"]).astype(float)
-            bound = bound.reshape(-1, 4, 4).transpose(0, 2, 1)
-            palette = world[skin["joints"]] @ bound
-            whole = sum(
-                np.einsum("vk,vkab->vab", weights, palette[joints])
-                for joints, weights in self.influence_sets()
-            )
+        attributes = self.primitives[0]["attributes"]
+        whole = self.moves(self.worlds(nodes), self.mesh_node, attributes, len(positions))
         moved = np.einsum("vab,vb->va", whole[:, :3, :3], positions) + whole[:, :3, 3]
         turned = np.einsum("vab,vb->va", whole[:, :3, :3], normals)
         return moved, turned / np.linalg.norm(turned, axis=1, keepdims=True)
@@ -284,39 +249,3 @@ class Gltf:
                 lengths = np.linalg.norm(output.astype(float), axis=1)
                 assert np.abs(lengths - 1.0).max() < UNIT
                 assert (np.einsum("fa,fa->f", output[1:], output[:-1]) >= 0.0).all()
-
-
-def line(times: np.ndarray, values: np.ndarray, time: float, turns: bool) -> list[float]:
-    """Interpolate a curve between its keys, rotations by slerp and other values linearly."""
-    if time <= times[0] or time >= times[-1]:
-        return values[0 if time <= times[0] else -1].tolist()
-    row = int(np.searchsorted(times, time, side="right")) - 1
-    share = (time - times[row]) / (times[row + 1] - times[row])
-    start, end = values[row], values[row + 1]
-    if not turns:
-        return ((1 - share) * start + share * end).tolist()
-    cosine = float(start @ end)
-    end, cosine = (-end, -cosine) if cosine < 0 else (end, cosine)
-    angle = math.acos(min(cosine, 1.0))
-    if angle < 1e-4:
-        return ((1 - share) * start + share * end).tolist()
-    mixed = math.sin((1 - share) * angle) * start + math.sin(share * angle) * end
-    return (mixed / math.sin(angle)).tolist()
-
-
-def matrix(node: dict) -> np.ndarray:
-    """Return the matrix T R S."""
-    x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    x, y, z, w = x / length, y / length, z / length, w / length
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    whole = np.eye(4)
-    whole[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
-    whole[:3, 3] = node.get("translation", [0, 0, 0])
-    return whole

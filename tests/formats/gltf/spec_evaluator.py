@@ -25,24 +25,20 @@ class Evaluator:
         if data[:4] == b"glTF":
             (size,) = struct.unpack_from("<I", data, 12)
             self.binary, data = data[28 + size :], data[20 : 20 + size]
-        self.root: dict[str, Any] = json.loads(data)
+        self.root: dict[str, Any] = json.loads(data, parse_constant=lambda word: 1 / 0)
         self.nodes = self.root["nodes"]
         children = ((n, c) for n, node in enumerate(self.nodes) for c in node.get("children", ()))
         self.parents = {child: node for node, child in children}
 
     # Arrays
 
-    def bytes_of(self, view: int) -> tuple[bytes, int]:
-        """Return the bytes of a buffer view up to the end of its buffer, and its stride."""
-        item = self.root["bufferViews"][view]
-        uri = self.root["buffers"][item["buffer"]].get("uri")
+    def buffer_bytes(self, index: int) -> bytes:
+        uri = self.root["buffers"][index].get("uri")
         if uri is None:
-            whole = self.binary
-        elif uri.startswith("data:"):
-            whole = base64.b64decode(uri.partition(",")[2])
-        else:
-            whole = (self.path.parent / unquote(uri)).read_bytes()
-        return whole[item.get("byteOffset", 0) :], item.get("byteStride", 0)
+            return self.binary
+        if uri.startswith("data:"):
+            return base64.b64decode(uri.partition(",")[2])
+        return (self.path.parent / unquote(uri, errors="surrogateescape")).read_bytes()
 
     def array(self, index: int) -> np.ndarray:
         """Return the values of an accessor, (N, C); normalised integers are fractions (3.6.2.2)."""
@@ -63,12 +59,10 @@ class Evaluator:
         return values
 
     def rows(self, item: dict[str, Any], kind: np.dtype, width: int, count: int) -> np.ndarray:
-        data, stride = self.bytes_of(item["bufferView"])
-        start, size = item.get("byteOffset", 0), width * kind.itemsize
-        rows = [
-            np.frombuffer(data, kind, width, start + n * (stride or size)) for n in range(count)
-        ]
-        return np.array(rows)
+        view = self.root["bufferViews"][item["bufferView"]]
+        start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
+        strides = (view.get("byteStride", width * kind.itemsize), kind.itemsize)
+        return np.ndarray((count, width), kind, self.buffer_bytes(view["buffer"]), start, strides)
 
     # Posing
 
@@ -140,16 +134,20 @@ class Evaluator:
         whole[:3, 3] = node.get("translation", (0, 0, 0))
         return whole
 
-    def world(self, nodes: list[dict[str, Any]], index: int) -> np.ndarray:
-        """Return the product of the local matrices from the root down."""
-        above, own = self.parents.get(index), self.local(nodes[index])
-        return own if above is None else self.world(nodes, above) @ own
+    def worlds(self, nodes: list[dict[str, Any]]) -> np.ndarray:
+        """Return the product of the local matrices from the root down to each node: (N, 4, 4)."""
+        found = np.array([self.local(node) for node in nodes])
+        for root in (n for n in range(len(nodes)) if n not in self.parents):
+            for node in self.below(root)[1:]:
+                found[node] = found[self.parents[node]] @ found[node]
+        return found
 
     # Vertices
 
     def meshes(self, animation: int | None = None, time: float = 0.0) -> list[np.ndarray]:
         """Return the posed vertices of each primitive, in tree order: (V, 3)."""
         nodes, found = self.posed(animation, time), []
+        worlds = self.worlds(nodes)
         for index in (n for root in self.scene_roots() for n in self.below(root)):
             node = nodes[index]
             mesh = self.root["meshes"][node["mesh"]] if "mesh" in node else {"primitives": ()}
@@ -160,7 +158,7 @@ class Evaluator:
                     if "POSITION" in target:
                         offset = self.array(target["POSITION"])
                         points = points + self.precision(weight) * offset
-                whole = self.moves(nodes, index, primitive["attributes"], len(points))
+                whole = self.moves(worlds, index, primitive["attributes"], len(points))
                 moved = np.einsum("vab,vb->va", whole[:, :3, :3], points) + whole[:, :3, 3]
                 found.append(moved)
         return found
@@ -187,17 +185,16 @@ class Evaluator:
         return [node, *(each for nodes in deeper for each in nodes)]
 
     def moves(
-        self, nodes: list[dict[str, Any]], index: int, attributes: dict[str, int], count: int
+        self, worlds: np.ndarray, index: int, attributes: dict[str, int], count: int
     ) -> np.ndarray:
         """Return the matrix of each vertex, with weights divided by their sum: (V, 4, 4)."""
-        if "skin" not in nodes[index]:
-            return np.broadcast_to(self.world(nodes, index), (count, 4, 4))
-        skin = self.root["skins"][nodes[index]["skin"]]
-        places = skin["joints"]
-        bound = np.tile(np.eye(4, dtype=self.precision), (len(places), 1, 1))
+        if "skin" not in self.nodes[index]:
+            return np.broadcast_to(worlds[index], (count, 4, 4))
+        skin = self.root["skins"][self.nodes[index]["skin"]]
+        palette = worlds[skin["joints"]]
         if "inverseBindMatrices" in skin:
-            bound = self.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
-        palette = np.array([self.world(nodes, j) @ b for j, b in zip(places, bound, strict=True)])
+            bound = self.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
+            palette = palette @ bound.transpose(0, 2, 1)
         sets = sum(name.startswith("JOINTS_") for name in attributes)
         joints = [self.array(attributes[f"JOINTS_{n}"]).astype(int) for n in range(sets)]
         weights = np.hstack([self.array(attributes[f"WEIGHTS_{n}"]) for n in range(sets)])
