@@ -172,14 +172,6 @@ def test_star_equals_the_direct_product():
     )
 
 
-def test_root_placement_is_applied_last():
-    parents = np.array([-1, 0, -1], dtype=np.int32)
-    local = random_locals(3, 1)
-    root = matrix(turn_y(0.5), (1, 2, 3))
-    expected = np.array([root @ world for world in plain_kinematics(parents, local)])
-    assert_allclose(forward_kinematics(parents, local, root), expected, atol=1e-14)
-
-
 def test_forward_kinematics_does_not_modify_its_arguments():
     parents = np.array([-1, 0, 1], dtype=np.int32)
     local = random_locals(3, 2)

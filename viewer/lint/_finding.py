@@ -135,22 +135,10 @@ class Finding:
         code = CODES[self.code]
         return (code.other_hint if self.line is None else "") or code.hint
 
-    def located(
-        self,
-        file: Path | None,
-        line: int | None = None,
-        severity: Severity | None = None,
-        pointer: str | None = None,
-    ) -> Finding:
-        """Return the finding with a new location in the files, and a severity if one is given."""
-        known = self.diagnostic
-        found = replace(
-            known,
-            path=file,
-            line=line,
-            level=severity or known.level,
-            pointer=known.pointer if pointer is None else pointer,
-        )
+    def located(self, file: Path, line: int | None = None, pointer: str | None = None) -> Finding:
+        """Return the finding with a new location in the files; without a pointer, with its own."""
+        pointer = self.diagnostic.pointer if pointer is None else pointer
+        found = replace(self.diagnostic, path=file, line=line, pointer=pointer)
         return replace(self, diagnostic=found)
 
     def place(self, longest: int = 300, is_short: bool = False) -> str:

@@ -21,11 +21,10 @@ _MOST_JOINTS = 4096  # maximum number of joints of hierarchies whose passes are 
 Indices = NDArray[np.intp]
 
 
-def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
+def forward_kinematics(parents: Ints, local: Floats) -> Floats:
     """Concatenate local matrices (J, 4, 4) down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Matrices of many poses are (J, F, n, n), and may be rotations alone. ``root`` (4, 4) places the
-    whole figure; the identity if omitted.
+    Matrices of many poses are (J, F, n, n), and may be rotations alone.
 
     >>> local = np.stack([np.eye(4)] * 2)
     >>> local[:, 0, 3] = 2.0, 1.0
@@ -39,7 +38,7 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
         for joint, parent in enumerate(parents.tolist()):
             if parent >= 0:
                 np.matmul(world[parent], local[joint], out=world[joint])
-        return world if root is None else root @ world
+        return world
     parents = np.asarray(parents, dtype=np.int32)
     # Pointer doubling: every pass multiplies each joint's matrix by the matrix of the ancestor to
     # which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
@@ -47,7 +46,7 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     is_kept = len(parents) <= _MOST_JOINTS
     for above, below in _kept_passes(parents.tobytes()) if is_kept else _passes(parents):
         world[below] = world[above] @ world[below]
-    return world if root is None else root @ world
+    return world
 
 
 def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:

@@ -227,9 +227,9 @@ def _rotated(similarity: Similarity, normals: Floats) -> Floats:
     return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 
-def trimmed_rms(distances: Floats, fraction: float = 0.9) -> float:
-    """Return the root mean square of the smallest ``fraction`` of the distances."""
-    count = max(1, int(np.ceil(fraction * len(distances))))
+def trimmed_rms(distances: Floats) -> float:
+    """Return the root mean square of the smallest nine tenths of the distances."""
+    count = max(1, int(np.ceil(0.9 * len(distances))))
     smallest = np.partition(distances, count - 1)[:count]
     return float(np.sqrt(np.mean(smallest**2)))
 

@@ -44,7 +44,7 @@ from viewer.rig.geometry.rotation import (
 )
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.kinematics import skinning_matrices, world_matrices, world_rotations
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations, placement_matrix
 from viewer.rig.posing.pose_vector import rotation_rows
@@ -176,11 +176,8 @@ def _rotate_joints(
     """Rotate joints by rotation vectors in the target's frame, in place."""
     parents = skeleton.parents
     within = joint_rotations(skeleton, pose)
-    world = within.copy()
+    world = world_rotations(parents, within)
     below = np.flatnonzero(parents >= 0).astype(np.int32)
-    for joint in below.tolist():
-        # Parents come first, so the parent's axes are already final.
-        world[joint] = world[parents[joint]] @ within[joint]
     # A joint whose parent has the axes P in the figure, which the alignment rotated by A, is
     # rotated by the vector (A P)^T w within its parent.
     axes = similarity.rotation @ world[parents[below]]

@@ -55,6 +55,7 @@ _STEPS = 2000  # maximum iterations of conjugate gradients
 _CONVERGED = 1e-9  # relative residual at which iterations end
 _ROUNDS = 10  # number of smoothing iterations
 _FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
+_REPORTED = 0.05  # fraction of the size up to which nearest vertices are reported as matched
 _NO_SUM = 1e-12  # minimum sum of weights that can be normalised
 
 
@@ -155,13 +156,11 @@ def _without_residue(points: SurfacePoints) -> SurfacePoints:
     return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
 
 
-def nearest_weights(
-    template: Floats, weights: Skin, positions: Floats, max_distance: float = 0.05
-) -> WeightTransfer:
-    """Copy the weights of the nearest vertex unchanged; ``max_distance`` is only reported."""
+def nearest_weights(template: Floats, weights: Skin, positions: Floats) -> WeightTransfer:
+    """Copy the weights of the nearest vertex unchanged, however far it is."""
     vertices, distances = nearest_vertices(template, positions)
     skin = skin_rows(weights, vertices)
-    near = distances <= max_distance * box_size(bounding_box(positions))
+    near = distances <= _REPORTED * box_size(bounding_box(positions))
     empty = np.zeros(0, dtype=np.int32)
     return WeightTransfer(
         starts=skin.starts,
