@@ -59,10 +59,6 @@ class Gltf(Evaluator):
             assert item.get(name, least.tolist()) == least.tolist()
         return rows[:, 0] if width == 1 else rows
 
-    def picture(self, index: int) -> bytes:
-        view = self.root["bufferViews"][self.root["images"][index]["bufferView"]]
-        return self.buffer[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
-
     def named(self, name: str) -> int:
         """Return the only node with this name."""
         (found,) = [n for n, node in enumerate(self.nodes) if node.get("name") == name]

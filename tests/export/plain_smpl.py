@@ -16,7 +16,7 @@ def rotation(vector: np.ndarray) -> np.ndarray:
 
 
 def smpl_forward(
-    arrays: dict, shape=(), pose=None, columns=None, correct=True
+    arrays: dict, shape=(), pose=None, columns=None, correct=True, turns=None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return posed vertices (V, 3) and joints (J, 3).
 
@@ -27,7 +27,7 @@ def smpl_forward(
     shape
         Weights of the first columns of ``shapedirs``, or of the given ``columns``.
     pose
-        (J, 3) rotation vectors.
+        (J, 3) rotation vectors, unless ``turns`` are given, (J, 3, 3).
     columns
         Columns that ``shape`` weights.
     correct
@@ -40,7 +40,7 @@ def smpl_forward(
     for weight, column in zip(shape, columns or range(len(shape)), strict=True):
         vertices += weight * arrays["shapedirs"][:, :, column]
     joints = arrays["J_regressor"] @ vertices
-    turns = [rotation(vector) for vector in pose]
+    turns = [rotation(vector) for vector in pose] if turns is None else turns
     if correct:
         blend = np.concatenate([(turn - np.eye(3)).ravel() for turn in turns[1:]])
         vertices = vertices + arrays["posedirs"] @ blend

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from export.plain_smpl import smpl_forward
 from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
@@ -189,25 +190,6 @@ def test_family_at_rest_is_its_template_plus_the_shape(tmp_path, kind):
     assert_allclose(rest_joints(shaped(figure, weights)), joints, atol=1e-14)
 
 
-def plain_smpl(arrays, weights, turns):
-    """Return the vertices of the authors' forward pass, with loops over joints and vertices."""
-    shape = arrays["v_template"] + arrays["shapedirs"] @ weights
-    joints = arrays["J_regressor"] @ shape
-    parents = arrays["kintree_table"][0].astype(np.int64)
-    drivers = np.concatenate([(turn - np.eye(3)).ravel() for turn in turns[1:]])
-    rest = shape + arrays["posedirs"] @ drivers
-    worlds = [matrix(turns[0], joints[0])]
-    for joint in range(1, len(joints)):
-        offset = joints[joint] - joints[parents[joint]]
-        worlds.append(worlds[parents[joint]] @ matrix(turns[joint], offset))
-    result = np.zeros_like(rest)
-    for vertex, row in enumerate(arrays["weights"]):
-        for joint in np.flatnonzero(row):
-            local = np.append(rest[vertex] - joints[joint], 1.0)
-            result[vertex] += row[joint] * (worlds[joint] @ local)[:3]
-    return result
-
-
 @pytest.mark.parametrize("kind", ["smpl", "flame"])
 def test_family_in_a_pose_follows_the_published_forward_pass(tmp_path, kind):
     arrays = model(kind)
@@ -218,7 +200,7 @@ def test_family_in_a_pose_follows_the_published_forward_pass(tmp_path, kind):
     pose.shape_weights[:] = rng.normal(size=len(pose.shape_weights))
     x, y, z = pose.dofs.reshape(-1, 3).T
     turns = [turn_z(c) @ turn_y(b) @ turn_x(a) for a, b, c in zip(x, y, z, strict=True)]
-    expected = plain_smpl(arrays, pose.shape_weights, turns)
+    expected, _ = smpl_forward(arrays, pose.shape_weights, turns=turns)
     assert_allclose(deform(figure, pose)[0], expected, atol=1e-13)
 
 

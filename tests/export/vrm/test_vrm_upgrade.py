@@ -96,7 +96,7 @@ def test_meta_permits_no_more_than_the_file(tmp_path):
     }
     written, _ = upgrade(file, tmp_path)
     meta = written.root["extensions"]["VRMC_vrm"]["meta"]
-    assert written.image(meta.pop("thumbnailImage")) == png((90, 90, 200))
+    assert written.picture(meta.pop("thumbnailImage")) == png((90, 90, 200))
     assert meta == {
         "name": "Ada",
         "version": "2",

@@ -16,7 +16,7 @@ SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class Evaluator:
-    """A file of triangles; images and extensions are ignored."""
+    """A file of triangles; extensions are ignored."""
 
     def __init__(self, path: Path, precision: type = np.float64) -> None:
         self.precision, self.path = precision, path
@@ -63,6 +63,11 @@ class Evaluator:
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
         strides = (view.get("byteStride", width * kind.itemsize), kind.itemsize)
         return np.ndarray((count, width), kind, self.buffer_bytes(view["buffer"]), start, strides)
+
+    def picture(self, index: int) -> bytes:
+        view = self.root["bufferViews"][self.root["images"][index]["bufferView"]]
+        start = view.get("byteOffset", 0)
+        return self.buffer_bytes(view["buffer"])[start : start + view["byteLength"]]
 
     # Posing
 

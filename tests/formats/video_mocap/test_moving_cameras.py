@@ -9,7 +9,6 @@ import pytest
 from formats.archive.joblib_bytes import joblib_file
 from formats.synthetic_smpl import model
 from formats.torch.torch_bytes import object_npy
-from formats.video_mocap.plain_smpl import vertices
 from formats.video_mocap.tool_files import (
     assert_drawn,
     drawn,
@@ -19,6 +18,7 @@ from formats.video_mocap.tool_files import (
     slahmr,
     tram_camera,
     tram_track,
+    vertices,
 )
 from numpy.testing import assert_allclose
 

@@ -11,7 +11,6 @@ from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
 from formats.synthetic_smpl import model
 from formats.torch.torch_bytes import torch_zip
-from formats.video_mocap.plain_smpl import vertices
 from formats.video_mocap.tool_files import (
     AHEAD,
     UPRIGHT,
@@ -25,6 +24,7 @@ from formats.video_mocap.tool_files import (
     phalp_body,
     scene_of,
     single,
+    vertices,
     wham,
     wham_file,
 )

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from export.plain_smpl import rotation, smpl_forward
 from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
-from formats.synthetic_smpl import model
+from formats.synthetic_smpl import joint_parents, model
 from formats.torch.torch_bytes import torch_zip
-from formats.video_mocap.plain_smpl import rotation
 from numpy.testing import assert_allclose
 
 import viewer
@@ -32,6 +32,25 @@ def matrices(vectors: Any) -> Any:
     """Return the rotation matrices of rotation vectors (..., 3)."""
     flat = np.asarray(vectors, dtype=np.float64).reshape(-1, 3)
     return np.array([rotation(vector) for vector in flat]).reshape(*np.shape(vectors), 3)
+
+
+def vertices(
+    kind: str, arrays: dict[str, Any], betas: Any, rotations: np.ndarray, transl: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices and joints of a pose by the published equations. ``rotations`` are (J, 3, 3).
+    Further joints have the identity, and further fingers of SMPL-X and SMPL+H the mean hand.
+    """
+    given = len(rotations)
+    turned = np.tile(np.eye(3), (len(joint_parents(kind)), 1, 1))
+    turned[:given] = rotations
+    for first, side in zip(
+        {"smplx": (25, 40), "smplh": (22, 37)}.get(kind, ()), "lr", strict=False
+    ):
+        for finger, vector in enumerate(arrays[f"hands_mean{side}"].reshape(15, 3)):
+            if first + finger >= given:
+                turned[first + finger] = rotation(vector)
+    moved, places = smpl_forward(arrays, betas, turns=turned)
+    return moved + np.asarray(transl), places + np.asarray(transl)
 
 
 def gvhmr(length: int = 4) -> dict[str, Any]:

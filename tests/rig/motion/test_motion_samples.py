@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from formats.synthetic_smpl import joint_parents, model
-from formats.video_mocap.plain_smpl import vertices
-from formats.video_mocap.tool_files import matrices, scene_of, wham, wham_file
+from formats.video_mocap.tool_files import matrices, scene_of, vertices, wham, wham_file
 from numpy.testing import assert_allclose, assert_array_equal
 from rendering.moving import MISSING, RATE, SPEED, moving_arm
 from rig.animated import about, channel, clip_of
