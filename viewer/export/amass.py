@@ -52,14 +52,7 @@ _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a motion in its own world unless another up axis is requested.
-
-    ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
-    ``options``: up axis (the scene's if empty) and handling of gaps. Returns notes: the written
-    files, then the data that the format cannot store. Raises ``RigError`` if the figure has other
-    joints or an unknown unit, a unit other than metres is requested, or no frame is present. Raises
-    ``OutputError`` if a file cannot be written.
-    """
+    """Write a motion in its own world unless another up axis is requested."""
     animation = selection.part.animation
     notes = write_layout(animation, path, options, "AMASS", _arrays)
     if len(animation.frames.shape_weights) > 1:

@@ -64,19 +64,7 @@ _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write people into one folder, with seven decimals.
-
-    Frames keep the numbers of the animations. Frames without people contain an empty list.
-
-    ``path``: the folder; its subfolder ``smpl`` is replaced if it contains only numbered frames.
-    ``options``: up axis (that of the scene if empty), and handling of gaps, which are kept unless
-    the options request holding or interpolation. ``persons``: number of each person; 0, 1, 2 … if
-    omitted, negative for untracked people. Returns notes: the written folder, then the data that
-    the format cannot store. Raises ``RigError`` if a figure has other joints or an unknown unit, a
-    unit other than metres is requested, frame rates differ, two people have the same number, or no
-    frame is present. Raises ``OutputError`` if the folder cannot be written, or contains other
-    files.
-    """
+    """Write people into one folder, with frames numbered as in the animations."""
     ups = sorted({part.up for part in selection.parts})
     if len(ups) > 1:
         raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")

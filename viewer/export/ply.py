@@ -25,11 +25,7 @@ _COLORS = ("red", "green", "blue", "alpha")
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write positions, normals and triangles; see ``viewer.export.export``.
-
-    Numbers are single precision, unless that moves a vertex by more than a millionth of the
-    figure's size: far from the origin, positions are written in double precision.
-    """
+    """Write positions, normals and triangles, in double precision only where single would show."""
     actor, skinning = selection.part.actor, options.skinning
     require_mesh(actor, ".ply")
     mesh = actor.figure.require_mesh()

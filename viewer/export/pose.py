@@ -27,11 +27,7 @@ _SAME = 1e-9  # difference of a number up to which it counts as stored
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``.
-
-    The file is read back and applied to the figure at rest. ``.json`` holds the whole pose,
-    ``.txt`` only the numbers of the model's pose vector.
-    """
+    """Write a pose that ``--pose`` and the window read: all of it (``.json``) or its vector."""
     actor, skinning = selection.part.actor, options.skinning
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:

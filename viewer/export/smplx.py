@@ -41,12 +41,7 @@ _PARTS = {
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a motion of a body of the family, z up unless another up axis is requested.
-
-    ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
-    Returns notes: the written files, then the data that the format cannot store. Raises ``RigError,
-    OutputError``: as for ``viewer.export.amass.export``.
-    """
+    """Write a motion of a body of the family, z up unless another up axis is requested."""
     animation = selection.part.animation
     wanted = replace(options, up=options.up or "z")
     notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from viewer.diagnostics import wording
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
-from viewer.phrases import printable
+from viewer.phrases import Remedy, printable
 from viewer.rig.bodies.smpl_family import gender_of, model_title
 
 GENDERS = ("gender", "genders")
@@ -16,6 +16,8 @@ RATES = (
     *("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "frameRate", "framerate"),
     *("video_fps", "frames_per_second"),
 )
+RATE_REMEDY = Remedy("Frames per second in the Timeline sets it", "--fps sets it")
+GENDER_REMEDY = Remedy("open the model of the right gender first", "--gender sets it")
 _MOST_SCALED = 1e6  # maximum scale of a body; AIST++ scales by about 100
 
 
@@ -41,12 +43,17 @@ def model_in(values: Iterable[Value]) -> str:
     return next(filter(None, titles), "")
 
 
-def scale_in(archive: Archive, key: str) -> float:
-    """Return a plausible scale of a body, by which AIST++ multiplies positions in metres."""
+def single(archive: Archive, key: str) -> float:
+    """Return a single finite number, which may be an array of one."""
     values = archive.array(key).values().ravel()
     if len(values) != 1:
         raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))
-    scale = float(finite(archive, key, values)[0])
+    return float(finite(archive, key, values)[0])
+
+
+def scale_in(archive: Archive, key: str) -> float:
+    """Return a plausible scale of a body, by which AIST++ multiplies positions in metres."""
+    scale = single(archive, key)
     low, high = 1.0 / _MOST_SCALED, _MOST_SCALED
     if not low <= scale <= high:
         raise archive.fault(

@@ -443,16 +443,14 @@ def _kind_of(path: Path, max_size: int) -> str | None:
     if not stat.S_ISREG(status.st_mode):
         return _KINDS.get(stat.S_IFMT(status.st_mode), "an unknown kind of file")
     if status.st_size > max_size:
-        raise FormatError(
-            note(
-                wording.TOO_LARGE,
-                path,
-                most=max_size,
-                size=status.st_size,
-                remedy=Remedy("", " (see --max-size)"),
-            )
-        )
+        raise too_large(path, status.st_size, max_size)
     return None
+
+
+def too_large(path: Path, size: int, most: int) -> FormatError:
+    """Return the error for a file, or its unpacked content, of more than ``most`` bytes."""
+    remedy = Remedy("", " (see --max-size)")
+    return FormatError(note(wording.TOO_LARGE, path, most=most, size=size, remedy=remedy))
 
 
 def _read_pipe(path: Path, max_size: int) -> bytes | None:

@@ -15,13 +15,13 @@ from typing import Literal
 
 from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive
-from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
+from viewer.formats._archive.zip import StoredFile, ZipDirectory, opened_member
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
 from viewer.formats._pickle.values import Span, noun
-from viewer.formats._source import InvalidValueError
-from viewer.phrases import Remedy, counted, printable, quoted
+from viewer.formats._source import InvalidValueError, too_large
+from viewer.phrases import counted, quoted
 
 _PICKLE = "/data.pkl"
 _LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays
@@ -46,12 +46,7 @@ def open_torch(directory: ZipDirectory) -> Archive:
         )
     size = members[found[0]].file_size
     if size > _LARGEST_PICKLE:
-        raise source.fault(
-            wording.TOO_LARGE,
-            most=_LARGEST_PICKLE,
-            size=size,
-            remedy=Remedy("", " (see --max-size)"),
-        )
+        raise too_large(source.path, size, _LARGEST_PICKLE)
     order: Literal["<", ">"] = "<"
     if f"{root}byteorder" in members:
         order = ">" if directory.archive.read(f"{root}byteorder") == b"big" else "<"
@@ -99,21 +94,13 @@ class _Storages:
 def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
     """Read the bytes of a member in pieces: reading it as a whole needs twice the memory."""
     room, done = bytearray(member.file_size), 0
-    try:
-        with (
-            storage.open() as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(member) as stream,
-        ):
-            while done < len(room):
-                piece = stream.read(min(_LARGEST_READ, len(room) - done))
-                if not piece:
-                    raise EOFError(f"{done} bytes")
-                room[done : done + len(piece)] = piece
-                done += len(piece)
-    except DAMAGE as problem:
-        reason = printable(problem, 100)
-        raise storage.fault(member.filename, wording.NPY_DAMAGED, reason=reason) from None
+    with opened_member(storage, member, member.filename) as stream:
+        while done < len(room):
+            piece = stream.read(min(_LARGEST_READ, len(room) - done))
+            if not piece:
+                raise EOFError(f"{done} bytes")
+            room[done : done + len(piece)] = piece
+            done += len(piece)
     return memoryview(room).toreadonly()
 
 

@@ -23,11 +23,21 @@ from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
-from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
+from viewer.formats._body_keys import (
+    GENDER_REMEDY,
+    GENDERS,
+    MODELS,
+    RATE_REMEDY,
+    RATES,
+    gender_in,
+    model_in,
+    scale_in,
+    single,
+)
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
-from viewer.phrases import Remedy, counted, listed, one_of
+from viewer.phrases import counted, listed, one_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 from viewer.rig.motion.body_motion import BodyMotion
@@ -310,15 +320,8 @@ def _coefficients(
     return _rows(archive, key, None if is_constant else count, first)
 
 
-def _single(archive: Archive, key: str) -> float:
-    values = archive.array(key).values().ravel()
-    if len(values) != 1:
-        raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))
-    return float(finite(archive, key, values)[0])
-
-
 def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
-    rates = {key: _single(archive, key) for key in RATES if archive.has(key)}
+    rates = {key: single(archive, key) for key in RATES if archive.has(key)}
     for key, rate in rates.items():
         if not is_rate(rate):
             raise archive.fault(
@@ -342,11 +345,7 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
         )
         return _RATE_OF_AIST
     if not source.options.get("fps"):  # a requested rate replaces the assumed one
-        source.warn(
-            wording.NO_RATE,
-            rate=_RATE,
-            remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
-        )
+        source.warn(wording.NO_RATE, rate=_RATE, remedy=RATE_REMEDY)
     return _RATE
 
 
@@ -383,10 +382,6 @@ def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> Sh
     said = [archive.objects(key) for key in GENDERS if archive.has(key)]
     gender, odd = gender_in(said[0] if said else None)
     if odd:
-        source.warn(
-            wording.MOTION_GENDER,
-            found=odd,
-            remedy=Remedy("open the model of the right gender first", "--gender sets it"),
-        )
+        source.warn(wording.MOTION_GENDER, found=odd, remedy=GENDER_REMEDY)
     title = model_in(archive.objects(key) for key in MODELS if archive.has(key))
     return ShapeSpace(title or model_of_joints(names), gender)

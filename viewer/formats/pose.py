@@ -40,7 +40,7 @@ from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
 from viewer.formats._archive.values import describe
-from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in
+from viewer.formats._body_keys import GENDER_REMEDY, GENDERS, MODELS, RATES, gender_in, model_in
 from viewer.formats._source import Source
 from viewer.formats._text.json_places import (
     constant_place,
@@ -53,7 +53,7 @@ from viewer.formats._text.words import read_numbers
 from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
-from viewer.phrases import Remedy, axes, listed, optional, printable, quoted
+from viewer.phrases import axes, listed, optional, printable, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
@@ -261,12 +261,7 @@ def _shape_space(named: _NamedValues) -> ShapeSpace:
     key = next((key for key in GENDERS if values.get(key) is not None), GENDERS[0])
     gender, odd = gender_in(values.get(key))
     if odd:
-        named.warn(
-            wording.MOTION_GENDER,
-            key,
-            found=odd,
-            remedy=Remedy("open the model of the right gender first", "--gender sets it"),
-        )
+        named.warn(wording.MOTION_GENDER, key, found=odd, remedy=GENDER_REMEDY)
     said = [values[key] for key in MODELS if key in values]
     # This program writes the titles of all models, others those of the SMPL family.
     title = str(said[0]) if said and "viewer_pose" in values else ""

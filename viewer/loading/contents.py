@@ -15,7 +15,7 @@ from viewer.diagnostics import Collector, Diagnostic, wording
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
-from viewer.phrases import Remedy, all_of, printable
+from viewer.phrases import all_of, printable
 from viewer.progress import report
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure, Origin
@@ -224,6 +224,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats import easymocap
+        from viewer.formats._body_keys import RATE_REMEDY
         from viewer.rig.captures.capture import capture_rate
 
         source.used_options |= {"images", "video"}
@@ -239,11 +240,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
         )
         capture = easymocap.read(source, options)
         if capture.n_frames > 1 and not (settings.frame_rate or video):
-            source.warn(
-                wording.NO_RATE,
-                rate=rate,
-                remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
-            )
+            source.warn(wording.NO_RATE, rate=rate, remedy=RATE_REMEDY)
         return capture
     if kind == "video_mocap":
         from viewer.formats import video_mocap

@@ -13,7 +13,6 @@ numpy's reader would evaluate it as Python code, and warns about files of Python
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 import struct
@@ -27,11 +26,10 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
-from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
-from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
-from viewer.formats._source import InvalidValueError, Source
-from viewer.phrases import Remedy, axes, printable
+from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory, opened_member
+from viewer.formats._source import InvalidValueError, Source, too_large
+from viewer.phrases import axes
 from viewer.rig.arrays import Deferred
 
 _MAX_AXES = 32
@@ -108,12 +106,7 @@ def open_npy(
         value: Value = header
     else:
         if storage.size > source.max_size:
-            raise source.fault(
-                wording.TOO_LARGE,
-                most=source.max_size,
-                size=storage.size,
-                remedy=Remedy("", " (see --max-size)"),
-            )
+            raise too_large(source.path, storage.size, source.max_size)
         value = header.deferred(partial(_load_file, storage, key, header))
     return Archive(source, "npy", (key,), {key: value}.__getitem__)
 
@@ -200,24 +193,10 @@ def _parse_shape(text: bytes | None) -> tuple[int, ...] | None:
     return tuple(map(int, words))
 
 
-@contextlib.contextmanager
-def _opened(storage: StoredFile, member: zipfile.ZipInfo) -> Iterator[IO[bytes]]:
-    """Open a member for reading; raise FormatError if it is damaged."""
-    try:
-        with (
-            storage.open() as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(member) as stream,
-        ):
-            yield stream
-    except DAMAGE as problem:
-        raise _damaged(storage, _key(member), problem) from None
-
-
 def _load_member(
     storage: StoredFile, member: zipfile.ZipInfo, header: _Header
 ) -> NDArray[np.generic]:
-    with _opened(storage, member) as stream:
+    with opened_member(storage, member, _key(member)) as stream:
         return _load(storage, _key(member), header, stream)
 
 
@@ -226,7 +205,7 @@ def _member_blocks(
 ) -> Iterator[NDArray[np.generic]]:
     """Yield blocks of rows, all in the same memory."""
     row = math.prod(header.shape[1:])
-    with _opened(storage, member) as stream:
+    with opened_member(storage, member, _key(member)) as stream:
         stream.read(header.offset)
         flat = np.empty(min(count, header.shape[0]) * row, header.dtype)
         for start in range(0, header.shape[0], count):
@@ -241,18 +220,14 @@ def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[np.gen
         with storage.open() as stream:
             return _load(storage, key, header, stream)
     except DAMAGE as problem:
-        raise _damaged(storage, key, problem) from None
+        raise storage.damaged(key, problem) from None
 
 
 def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
     """Return the pickle of a member that is an array of objects."""
-    with _opened(storage, member) as stream:
+    with opened_member(storage, member, _key(member)) as stream:
         _read_header(storage, _key(member), stream, member.file_size)
         return b"".join(iter(partial(stream.read, _CHUNK), b""))
-
-
-def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
-    return storage.fault(key, wording.NPY_DAMAGED, reason=printable(problem, 100))
 
 
 def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[np.generic]:

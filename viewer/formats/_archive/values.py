@@ -443,10 +443,7 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
 def shaped(
     flat: NDArray[np.generic], shape: tuple[int, ...], is_fortran: bool
 ) -> NDArray[np.generic]:
-    """Return flat values in their shape, C order and native byte order; copied if needed.
-
-    Raises ``InvalidValueError`` if an element of a string array is not a valid character.
-    """
+    """Return flat values in their shape, C order and native byte order; copied if needed."""
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
         # numpy accepts any byte as bool, and then computes wrong results.
         flat = flat.view(np.uint8) != 0

@@ -17,8 +17,8 @@ from typing import IO, cast, overload
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._source import Source, phrased, unreadable
-from viewer.phrases import Remedy, printable
+from viewer.formats._source import Source, phrased, too_large, unreadable
+from viewer.phrases import printable
 
 DAMAGE = (
     zipfile.BadZipFile,
@@ -92,12 +92,7 @@ class ZipDirectory:
                 )
         total = sum(member.file_size for member in self.members)
         if total > source.max_size:
-            raise source.fault(
-                wording.TOO_LARGE,
-                most=source.max_size,
-                size=total,
-                remedy=Remedy("", " (see --max-size)"),
-            )
+            raise too_large(source.path, total, source.max_size)
         if total > max(SMALL, MAX_RATIO * size):
             raise source.fault(
                 "F002.npz-ratio: expected a compression ratio of at most {most}, found {found} "
@@ -183,6 +178,24 @@ class StoredFile:
     def fault(self, key: str, problem: str | Phrase, **values: object) -> FormatError:
         """Return an error that states the file and the key."""
         return value_fault(self.path, key, problem, values)
+
+    def damaged(self, key: str, problem: Exception) -> FormatError:
+        """Return the error for a value whose bytes cannot be unpacked."""
+        return self.fault(key, wording.NPY_DAMAGED, reason=printable(problem, 100))
+
+
+@contextmanager
+def opened_member(storage: StoredFile, member: zipfile.ZipInfo, key: str) -> Iterator[IO[bytes]]:
+    """Open a member for reading; raise FormatError if it is damaged."""
+    try:
+        with (
+            storage.open() as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(member) as stream,
+        ):
+            yield stream
+    except DAMAGE as problem:
+        raise storage.damaged(key, problem) from None
 
 
 def value_fault(

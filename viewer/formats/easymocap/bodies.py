@@ -15,7 +15,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import within_text
@@ -100,35 +100,21 @@ def body_layout(record: Record, usual: Mapping[str, int] | None = None) -> BodyL
         )
     layout = _LAYOUTS.get(count)
     if layout is None:
-        problem = Phrase(
-            "expected {expected} numbers, found {found}",
-            expected=one_of(sorted(_LAYOUTS)),
-            found=count,
-        )
-        raise RecordError("poses", problem)
+        raise _odd_length(sorted(_LAYOUTS), count)
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
     keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
-    hands = layout.hands
     if count == 63:
         keys += [key for key in ("handl", "handr") if has_numbers(record, key)]
     widths = [(key, width_of(record, key, width)) for key, width in widths]
     widths += [(key, max(width_of(record, key), usual.get(key, 0))) for key in keys]
     if count != usual.get("poses", count):
-        problem = Phrase(
-            "expected {expected} numbers, found {found}",
-            expected=one_of([usual["poses"]]),
-            found=count,
-        )
-        raise RecordError("poses", problem)
-    return BodyLayout(
-        layout.model,
-        layout.names,
-        layout.columns,
-        layout.root,
-        hands,
-        layout.is_flat,
-        tuple(widths),
-    )
+        raise _odd_length([usual["poses"]], count)
+    return replace(layout, widths=tuple(widths))
+
+
+def _odd_length(expected: list[int], found: int) -> RecordError:
+    sentence = "expected {expected} numbers, found {found}"
+    return RecordError("poses", sentence, expected=one_of(expected), found=found)
 
 
 def with_coefficients(layout: BodyLayout, record: Record, usual: Mapping[str, int]) -> BodyLayout:

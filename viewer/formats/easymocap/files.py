@@ -17,7 +17,7 @@ from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._published_models import published_names
-from viewer.formats._source import InvalidValueError, Source, unreadable
+from viewer.formats._source import InvalidValueError, Source, too_large, unreadable
 from viewer.formats._text.json_places import (
     Keys,
     decoded,
@@ -329,14 +329,7 @@ def _read(path: str, max_size: int) -> bytes:
     try:
         size = os.fstat(handle).st_size
         if size > max_size:
-            raise _fault(
-                wording.TOO_LARGE,
-                path,
-                None,
-                most=max_size,
-                size=size,
-                remedy=Remedy("", " (see --max-size)"),
-            )
+            raise too_large(Path(path), size, max_size)
         data = os.read(handle, size + 1)
         while 0 < len(data) < size and (more := os.read(handle, size - len(data) + 1)):
             data += more

@@ -439,12 +439,18 @@ def with_facts(found: list[ParameterDict]) -> list[ParameterDict]:
     return [completed(one) for one in found]
 
 
-def _identity(value: Value) -> int | str | None:
-    """Return the number or name of a person or frame; None for other values."""
+def only_element(value: Value) -> Value:
+    """Return the only element of an array, or of lists in lists; other values unchanged."""
     if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
         value = value.values().reshape(-1)[0].item()
     if isinstance(value, list | tuple) and len(value) == 1:
-        return _identity(value[0])
+        return only_element(value[0])
+    return value
+
+
+def _identity(value: Value) -> int | str | None:
+    """Return the number or name of a person or frame; None for other values."""
+    value = only_element(value)
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
     if isinstance(value, float) and value.is_integer():

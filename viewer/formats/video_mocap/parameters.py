@@ -23,7 +23,7 @@ from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
-from viewer.formats._body_keys import gender_in, model_in, scale_in
+from viewer.formats._body_keys import GENDER_REMEDY, gender_in, model_in, scale_in
 from viewer.formats._frame_gaps import frame_spans
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import (
@@ -45,12 +45,13 @@ from viewer.formats.video_mocap.parameter_layout import (
     ParameterLayout,
     StatedValue,
     identities,
+    only_element,
     parameter_dicts,
     parameter_layout,
     with_facts,
 )
 from viewer.formats.video_mocap.results import Results, Track
-from viewer.phrases import Remedy, agree, counted, listed, optional, printable
+from viewer.phrases import agree, counted, listed, optional, printable
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, gender_of
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
@@ -179,10 +180,7 @@ def _rate(source: Source, found: list[ParameterDict]) -> float | None:
 
 def _number(value: Value) -> float | None:
     """Return a number, also as text or an array of one; None for other values."""
-    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
-        value = value.values().reshape(-1)[0].item()
-    if isinstance(value, list | tuple) and len(value) == 1:
-        return _number(value[0])
+    value = only_element(value)
     if isinstance(value, bool) or not isinstance(value, int | float | str | bytes):
         return None
     try:
@@ -481,11 +479,7 @@ def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
         whole = _joined([track for track, _ in parts]).selected(first)
         said = [*filter(None, genders[number])]
         if len(said) > 1:
-            source.warn(
-                wording.MOTION_GENDER,
-                found=", ".join(said),
-                remedy=Remedy("open the model of the right gender first", "--gender sets it"),
-            )
+            source.warn(wording.MOTION_GENDER, found=", ".join(said), remedy=GENDER_REMEDY)
         people[number] = replace(whole, frames=frames, gender=said[0] if len(said) == 1 else "")
     return people
 

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
+from viewer.formats._body_keys import RATE_REMEDY
 from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
-from viewer.phrases import Remedy, agree, counted, listed
+from viewer.phrases import agree, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.cameras import CameraMotion, CameraView
@@ -213,11 +214,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     known = options.frame_rate, results.frame_rate, options.video_rate
     rate = capture_rate(*known)
     if not any(known) and last > first:
-        source.warn(
-            wording.NO_RATE,
-            rate=rate,
-            remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
-        )
+        source.warn(wording.NO_RATE, rate=rate, remedy=RATE_REMEDY)
     source.used_options |= {"space"} | ({"average-shape"} if _shapes_vary(results) else set())
     capture = _Capture(source, results, options, first, last - first + 1, rate, gaps)
     return capture.in_space(space)
