@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -50,54 +51,43 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
 
 def check_lines(
     figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float
-) -> list[Diagnostic]:
+) -> Iterator[Diagnostic]:
     """Return messages about the results of ``invert_skinning`` and of the checks above."""
-    lines = []
     if out:
         skeleton = figure.skeleton
         assert skeleton is not None  # only joints of a skeleton are listed
         names = [joint_label(skeleton, joint) for joint in out]
         joints = np.array(out, dtype=np.int32)
-        lines.append(
-            Diagnostic(
-                "R009.joints: joints outside the mesh: {names}",
-                None,
-                None,
-                "joints",
-                joints,
-                {"names": listed(names, 8)},
-            )
+        yield Diagnostic(
+            "R009.joints: joints outside the mesh: {names}",
+            None,
+            None,
+            "joints",
+            joints,
+            {"names": listed(names, 8)},
         )
     vertices = np.flatnonzero(guarded).astype(np.int32)
     if len(vertices):
         values = {"n": counted(len(vertices), "vertex"), "vertices": listed(vertices.tolist(), 8)}
-        lines.append(
-            Diagnostic(
-                "R010.vertices: {n} bent too far for exact inverse skinning, so smoothed: "
-                "{vertices}",
-                None,
-                None,
-                "positions",
-                vertices,
-                values,
-            )
+        yield Diagnostic(
+            "R010.vertices: {n} bent too far for exact inverse skinning, so smoothed: {vertices}",
+            None,
+            None,
+            "positions",
+            vertices,
+            values,
         )
-    lines.append(
-        Diagnostic(
-            "R011.residual: after posing, the mesh differs from the target by at most "
-            "{residual:.3%} of its size",
-            values={"residual": residual},
-        )
+    yield Diagnostic(
+        "R011.residual: after posing, the mesh differs from the target by at most "
+        "{residual:.3%} of its size",
+        values={"residual": residual},
     )
     if residual > _EXACT and not len(vertices):
-        lines.append(
-            Diagnostic(
-                "R012.residual: after posing, the mesh differs from the target by more than "
-                "{limit:.2%} of its size",
-                values={"limit": _EXACT},
-            )
+        yield Diagnostic(
+            "R012.residual: after posing, the mesh differs from the target by more than "
+            "{limit:.2%} of its size",
+            values={"limit": _EXACT},
         )
-    return lines
 
 
 def with_joint_name(line: Diagnostic, figure: Figure) -> Diagnostic:

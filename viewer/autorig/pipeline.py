@@ -7,6 +7,7 @@ comparison, is in ``seed``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -232,41 +233,33 @@ def _at_rest(
     return figure, found.guarded
 
 
-def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
+def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> Iterator[Diagnostic]:
     """Return messages about the target's winding and unit."""
-    lines = []
     n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if n_reversed:
-        lines.append(
-            Diagnostic(
-                "R014.wound: {n} wound inside out: reversed in the result",
-                values={"n": counted(n_reversed, "triangle")},
-            )
+        yield Diagnostic(
+            "R014.wound: {n} wound inside out: reversed in the result",
+            values={"n": counted(n_reversed, "triangle")},
         )
     if template.unit in UNIT_NAMES:
-        lines.append(
-            Diagnostic(
+        if figure.unit in UNIT_NAMES:
+            yield Diagnostic(
                 "R014.unit: unit estimated from the size: {unit}",
                 values={"unit": UNIT_NAMES[figure.unit]},
             )
-            if figure.unit in UNIT_NAMES
-            else Diagnostic(
+        else:
+            yield Diagnostic(
                 "R014.unit-unknown: unit unknown, because the target is much larger or smaller "
                 "than the template"
             )
-        )
-    return lines
 
 
-def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
+def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> Iterator[Diagnostic]:
     """Return messages about template data that is missing in the new figure."""
-    lines = []
     if template.blend_shapes is not None:
-        lines.append(
-            Diagnostic(
-                "R013.shapes: {n} of the template not transferred",
-                values={"n": counted(template.n_shapes, "blend shape")},
-            )
+        yield Diagnostic(
+            "R013.shapes: {n} of the template not transferred",
+            values={"n": counted(template.n_shapes, "blend shape")},
         )
     if template.correctives is not None and figure.correctives is None:
         key = (
@@ -275,8 +268,7 @@ def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> l
             if how.correctives
             else "R013.correctives: pose correctives of the template omitted"
         )
-        lines.append(Diagnostic(key))
-    return lines
+        yield Diagnostic(key)
 
 
 def _parts(figure: Figure) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.autorig.correspondence import Matches
@@ -71,20 +73,18 @@ def nothing_matched(distances: Floats, size: float) -> str:
     )
 
 
-def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
+def template_lines(skin: Skin) -> Iterator[Diagnostic]:
     """Return messages about errors in the template's weights."""
     negative = int((skin.weights < 0.0).sum())
     if not negative:
-        return ()
-    return (
-        Diagnostic(
-            "R005.negative-weights: {n} of the template treated as 0",
-            values={"n": counted(negative, "negative weight")},
-        ),
+        return
+    yield Diagnostic(
+        "R005.negative-weights: {n} of the template treated as 0",
+        values={"n": counted(negative, "negative weight")},
     )
 
 
-def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
+def match_lines(found: Matches, inpainted: Bools, method: str) -> Iterator[Diagnostic]:
     """Return messages about matched, reversed and inpainted parts."""
     ratio = float(found.matched.mean())
     values = {
@@ -93,46 +93,37 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnost
         "ratio": ratio,
         "inpainted": int(inpainted.sum()),
     }
-    lines = [
-        Diagnostic(
-            "R005.matched: matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
-            values=values,
-        )
-    ]
+    yield Diagnostic(
+        "R005.matched: matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
+        values=values,
+    )
     if ratio < _FEW:
-        lines.append(
-            Diagnostic(
-                "R006.matched: less than {limit:.0%} of the target matches the template: check the "
-                "alignment or allow a larger distance",
-                values={"limit": _FEW},
-            )
+        yield Diagnostic(
+            "R006.matched: less than {limit:.0%} of the target matches the template: check the "
+            "alignment or allow a larger distance",
+            values={"limit": _FEW},
         )
     if len(found.inside_out):
-        lines.append(
-            Diagnostic(
-                "R005.reversed: {n} of the target {are} wound opposite to the template: matched "
-                "with reversed normals",
-                values={
-                    "n": counted(len(found.inside_out), "part"),
-                    "are": agree(len(found.inside_out), "is", "are"),
-                },
-            )
+        yield Diagnostic(
+            "R005.reversed: {n} of the target {are} wound opposite to the template: matched "
+            "with reversed normals",
+            values={
+                "n": counted(len(found.inside_out), "part"),
+                "are": agree(len(found.inside_out), "is", "are"),
+            },
         )
     if method != "direct":
-        lines.append(
-            Diagnostic(
-                "R005.solver: weights inpainted with the fallback solver: {method}",
-                values={"method": method},
-            )
+        yield Diagnostic(
+            "R005.solver: weights inpainted with the fallback solver: {method}",
+            values={"method": method},
         )
-    return tuple(lines)
 
 
-def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
+def rigid_lines(rigid: RigidIslands) -> Iterator[Diagnostic]:
     """Return a message for each of the largest rigid islands, and one for the others."""
     order = np.argsort(-rigid.counts, kind="stable")
-    lines = [
-        Diagnostic(
+    for island in order[:_LISTED]:
+        yield Diagnostic(
             "R007.part: the part of {n} at vertex {vertex} has no match in the template: it "
             "moves rigidly, mostly with joint {joint}",
             values={
@@ -141,14 +132,9 @@ def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
                 "joint": int(rigid.joints[island]),
             },
         )
-        for island in order[:_LISTED]
-    ]
     more = len(order) - _LISTED
     if more > 0:
-        lines.append(
-            Diagnostic(
-                "R007.more-parts: {n} also {move} rigidly",
-                values={"n": counted(more, "smaller part"), "move": agree(more, "moves", "move")},
-            )
+        yield Diagnostic(
+            "R007.more-parts: {n} also {move} rigidly",
+            values={"n": counted(more, "smaller part"), "move": agree(more, "moves", "move")},
         )
-    return tuple(lines)
