@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from collections.abc import Set as AbstractSet
+from functools import partial
 from typing import TypeAlias
 
 from viewer.errors import FormatError
@@ -46,63 +47,34 @@ def animations_of(
     beside: AbstractSet[int] = frozenset(),
 ) -> tuple[Animation, ...]:
     """Return the animations that move a joint, a blend shape, or a camera node in ``beside``."""
+
+    def clip(number: int) -> TransformClip:
+        channels: dict[tuple[str, object], TransformChannel] = {}
+        for at, channel in enumerate(readers[number]()):
+            is_shape = channel.path == "weights"
+            if channel.node not in (columns if is_shape else joints):
+                continue
+            shapes = columns[channel.node] if is_shape else None
+            # Nodes that share blend shapes have equal keys, so one channel is enough.
+            key = channel.path, at if shapes is None else shapes.tobytes()
+            channels.setdefault(
+                key,
+                TransformChannel(
+                    -1 if is_shape else joints[channel.node],
+                    channel.path,
+                    channel.times,
+                    channel.values,
+                    channel.interpolation,
+                    channel.tangents,
+                    shapes,
+                ),
+            )
+        each = animations[number]
+        played = tuple(channels.values())
+        return TransformClip(each.name, played, each.start, each.end, each.extras, number)
+
     return tuple(
-        Animation(
-            animation.name,
-            animation.start,
-            animation.end,
-            _clip(animation, read, number),
-            animation.pointer,
-            number,
-        )
-        for number, (animation, read) in enumerate(
-            zip(animations, _bound(readers, joints, columns), strict=True)
-        )
-        if any(node in joints or node in columns or node in beside for node in animation.nodes)
-    )
-
-
-def _bound(
-    readers: list[Reader], joints: Mapping[int, int], columns: Mapping[int, Ints]
-) -> list[Callable[[], tuple[TransformChannel, ...]]]:
-    """Return a function per animation that returns the channels of one figure."""
-
-    def bound(read: Reader) -> Callable[[], tuple[TransformChannel, ...]]:
-        def channels() -> tuple[TransformChannel, ...]:
-            found: dict[tuple[str, object], TransformChannel] = {}
-            for number, channel in enumerate(read()):
-                moved = _channel(channel, joints, columns)
-                if moved is not None:
-                    # Nodes that share blend shapes have equal keys, so one channel is enough.
-                    shapes = None if moved.shapes is None else moved.shapes.tobytes()
-                    found.setdefault((moved.path, shapes or number), moved)
-            return tuple(found.values())
-
-        return channels
-
-    return [bound(read) for read in readers]
-
-
-def _clip(
-    animation: NodeAnimation, channels: Callable[[], tuple[TransformChannel, ...]], number: int
-) -> Callable[[], TransformClip]:
-    start, end, extras = animation.start, animation.end, animation.extras
-    return lambda: TransformClip(animation.name, channels(), start, end, extras, number)
-
-
-def _channel(
-    channel: NodeChannel, joints: Mapping[int, int], columns: Mapping[int, Ints]
-) -> TransformChannel | None:
-    """Return the channel of a joint or of blend shapes; None if it moves another figure."""
-    is_shape = channel.path == "weights"
-    if channel.node not in (columns if is_shape else joints):
-        return None
-    return TransformChannel(
-        -1 if is_shape else joints[channel.node],
-        channel.path,
-        channel.times,
-        channel.values,
-        channel.interpolation,
-        channel.tangents,
-        columns[channel.node] if is_shape else None,
+        Animation(each.name, each.start, each.end, partial(clip, number), each.pointer, number)
+        for number, each in enumerate(animations)
+        if any(node in joints or node in columns or node in beside for node in each.nodes)
     )

@@ -104,7 +104,9 @@ def upgraded_binds(told: object, materials: list[Any]) -> tuple[dict[str, list[A
             continue
         for owner in owners:
             if name in _COLORS:
-                target = _linear(name, value).tolist()
+                # Emission is linear in the file, other colours are sRGB.
+                color = value[:3] if name == _LINEAR else decode_srgb(value[:3].clip(0.0, 1.0))
+                target = [*color.tolist(), float(value[3])]
                 colors.append({"material": owner, "type": _COLORS[name], "targetValue": target})
                 continue
             move = moves.setdefault(owner, _main_transform(materials[owner]))
@@ -117,13 +119,6 @@ def upgraded_binds(told: object, materials: list[Any]) -> tuple[dict[str, list[A
     ]
     named_rows = {"materialColorBinds": colors, "textureTransformBinds": moved}
     return {name: rows for name, rows in named_rows.items() if rows}, lost
-
-
-def _linear(name: str, value: Floats) -> Floats:
-    """Return a colour as linear values; its opacity is unchanged."""
-    if name == _LINEAR:
-        return value
-    return np.append(decode_srgb(value[:3].clip(0.0, 1.0)), value[3])
 
 
 def _main_transform(told: object) -> Floats:
@@ -179,7 +174,9 @@ def overridden(core: Mapping[str, object], told: object) -> Json:
         index = part(told, "textureProperties", name)
         if isinstance(index, int):
             given = owner.get(member)
-            kept = given if isinstance(given, dict) else _scale(told, name)
+            scale = value_of(part(told, "floatProperties", "_BumpScale"), 1.0)
+            scaled = {} if name != "_BumpMap" or scale is None else {"scale": scale}
+            kept = given if isinstance(given, dict) else scaled
             owner[member] = {**kept, "index": index}
         if isinstance(owner.get(member), dict):
             owner[member] = {**owner[member], **placed}
@@ -213,12 +210,6 @@ def _placement(told: object) -> Json:
     if values == [1.0, 1.0, 0.0, 0.0]:
         return {}
     return {"extensions": {_TEXTURE_TRANSFORM: {"scale": values[:2], "offset": values[2:]}}}
-
-
-def _scale(told: object, name: str) -> dict[str, float]:
-    """Return the scale of a texture of normals."""
-    scale = value_of(part(told, "floatProperties", "_BumpScale"), 1.0)
-    return {} if name != "_BumpMap" or scale is None else {"scale": scale}
 
 
 def _emission(told: object, extensions: object) -> Json:
@@ -259,7 +250,12 @@ def modern_toon(told: object) -> tuple[Json, list[str]]:
         toon[new] = decode_srgb(color[:3].clip(0.0, 1.0)).tolist()
     for old, (new, default, factor) in _TOON_NUMBERS.items():
         toon[new] = 0.0 + factor * number(old, default)
-    toon |= _placed_textures(told)
+    placed = _placement(told)
+    for old, new in _TOON_TEXTURES.items():
+        index = part(told, "textureProperties", old)
+        if isinstance(index, int):
+            # The sphere map is not placed like the main texture.
+            toon[new] = {"index": index} | (placed if old != "_SphereAdd" else {})
     if "matcapTexture" in toon:
         toon["matcapFactor"] = [1.0, 1.0, 1.0]
     name = part(told, "name")
@@ -275,13 +271,3 @@ def _modern_ramp(toony: float, shift: float) -> tuple[float, float]:
     # t' = 1 - (e - s) / 2 = t + (1 - t) (1 + s) / 2, so s' = -s - (1 - t').
     toony += (1.0 - toony) * (0.5 + 0.5 * shift)
     return toony, -shift - (1.0 - toony)
-
-
-def _placed_textures(told: object) -> Json:
-    """Return the textures, placed like the main texture, except for the sphere map."""
-    found, placed = dict[str, Any](), _placement(told)
-    for old, new in _TOON_TEXTURES.items():
-        index = part(told, "textureProperties", old)
-        if isinstance(index, int):
-            found[new] = {"index": index} | (placed if old != "_SphereAdd" else {})
-    return found

@@ -18,7 +18,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -73,7 +73,13 @@ def read_springs(file: NodeFile, source: Source, ends: Mapping[int, Floats]) -> 
     if not isinstance(told, dict):
         return None
     shapes, groups = _shapes(file, told, source)
-    chains = [*_chains(file, told, groups, source, ends)]
+    chains = []
+    for index, spring in enumerate(list_in(told, "springs")):
+        chain = _chain(file.tree, spring, groups, ends)
+        if chain is None:
+            source.warn(wording.SPRING, f"/extensions/{_EXTENSION}/springs/{index}")
+        elif chain:
+            chains.append(chain)
     found: dict[int, _SpringJoint] = {}
     for chain in chains:
         for joint in chain:
@@ -143,17 +149,6 @@ def _shape(node: object, told: object, n_nodes: int) -> _Shape | None:
             return None
         return _Shape(node, offset, offset + normal, 0.0, PLANE)
     return _Shape(node, offset, tail, radius, INSIDE if part(given, "inside") is True else OUTSIDE)
-
-
-def _chains(
-    file: NodeFile, told: object, groups: _Groups, source: Source, ends: Mapping[int, Floats]
-) -> Iterator[list[_SpringJoint]]:
-    for index, spring in enumerate(list_in(told, "springs")):
-        chain = _chain(file.tree, spring, groups, ends)
-        if chain is None:
-            source.warn(wording.SPRING, f"/extensions/{_EXTENSION}/springs/{index}")
-        elif chain:
-            yield chain
 
 
 def _chain(
