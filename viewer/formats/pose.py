@@ -325,8 +325,24 @@ def _read_rotations(named: _NamedValues) -> JointRotations | None:
     values = named.values
     if values.get("joint_turns") is None:
         return None
-    names = _joint_names(named)
+    listed_names = named.array("joint_names", "U", Phrase("names"))
+    if listed_names.ndim != 1:
+        raise named.fault(
+            "F002.pose-list: {item}: expected a one-dimensional list of names, found {found} "
+            "dimensions",
+            "joint_names",
+            item="joint_names",
+            found=listed_names.ndim,
+        )
+    names = tuple(listed_names.tolist())
     turns = _quaternions(named, "joint_turns", names)
+    up = _word(named, "up", "y")
+    if up not in _UPS:
+        raise named.fault(
+            'F002.pose-up: up: expected "y" or "z", found {found}',
+            "up",
+            found=quoted(printable(up, 20)),
+        )
     rotations = values.get("joint_rotations")
     shifts, scales = values.get("joint_shifts"), values.get("joint_scales")
     return JointRotations(
@@ -336,27 +352,13 @@ def _read_rotations(named: _NamedValues) -> JointRotations | None:
         np.zeros((len(names), 3))
         if shifts is None
         else _rows(named, "joint_shifts", len(names), 3),
-        _up(named),
+        up,
         _word(named, "dof_layout", ""),
         None if rotations is None else _quaternions(named, "joint_rotations", names),
         _meanings(named, len(names)),
         _left(named),
         None if scales is None else _rows(named, "joint_scales", len(names), 3),
     )
-
-
-def _joint_names(named: _NamedValues) -> tuple[str, ...]:
-    names = named.array("joint_names", "U", Phrase("names"))
-    if names.ndim != 1:
-        key = "joint_names"
-        raise named.fault(
-            "F002.pose-list: {item}: expected a one-dimensional list of names, found {found} "
-            "dimensions",
-            key,
-            item=key,
-            found=names.ndim,
-        )
-    return tuple(names.tolist())
 
 
 def _quaternions(named: _NamedValues, key: str, names: tuple[str, ...]) -> Floats:
@@ -401,17 +403,6 @@ def _left(named: _NamedValues) -> Floats:
     found = _rows(named, "left", 1, 3)[0]
     length = np.linalg.norm(found)
     return found / length if length > _SHORTEST else np.array([1.0, 0.0, 0.0])
-
-
-def _up(named: _NamedValues) -> str:
-    word = _word(named, "up", "y")
-    if word not in _UPS:
-        raise named.fault(
-            'F002.pose-up: up: expected "y" or "z", found {found}',
-            "up",
-            found=quoted(printable(word, 20)),
-        )
-    return word
 
 
 def _word(named: _NamedValues, key: str, default: str) -> str:

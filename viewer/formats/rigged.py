@@ -107,7 +107,11 @@ def read(source: Source) -> Figure:
             up="z" if up == "z" else "y",
             unit=archive.text("unit"),
             correctives=_correctives(archive, count),
-            hands=tuple(_hand(archive, index, count) for index in _hands(archive)),
+            hands=tuple(
+                _hand(archive, index, count)
+                for index in range(_MOST_HANDS)
+                if archive.has(f"hand_{index}_joints")
+            ),
             pose_layout=_layout(archive, count),
             fields=_fields(archive),
         )
@@ -353,10 +357,6 @@ def _layout(archive: Archive, n_joints: int) -> PoseLayout | None:
     return PoseLayout(total, starts.astype(np.int32), is_euler, translation, scale)
 
 
-def _hands(archive: Archive) -> list[int]:
-    return [index for index in range(_MOST_HANDS) if archive.has(f"hand_{index}_joints")]
-
-
 def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
     key = f"hand_{index}_joints"
     joints = _numbers(archive, key, (None,))
@@ -432,12 +432,21 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
         arrays[key] = getattr(skeleton, key)
     if figure.correctives is not None:
         arrays["correctives"] = figure.correctives.values().astype(np.float32)
-    arrays |= _mesh_arrays(mesh) | _layout_arrays(figure.pose_layout)
+    arrays |= _mesh_arrays(mesh)
+    if figure.pose_layout is not None:
+        layout = figure.pose_layout
+        arrays["layout_starts"], arrays["layout_is_euler"] = layout.starts, layout.is_euler
+        arrays["layout_counts"] = np.array([layout.n_numbers, layout.translation, layout.scale])
     for index, hand in enumerate(figure.hands):
         arrays[f"hand_{index}_side"] = np.array(hand.side)
         for key in ("joints", "components", "mean"):
             arrays[f"hand_{index}_{key}"] = getattr(hand, key)
-    arrays |= _field_arrays(figure)
+    for index, field in enumerate(figure.fields):
+        for key in ("name", "title", "unit"):
+            arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))
+        arrays[f"field_{index}_values"] = field.values
+        if field.names:
+            arrays[f"field_{index}_names"] = np.array(field.names)
     return {key: array for key, array in arrays.items() if array is not None}
 
 
@@ -511,24 +520,3 @@ def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) ->
             number = pictures.setdefault(id(texture.image), (len(pictures), texture.image))[0]
             placing["picture"] = number
     return placing
-
-
-def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[np.generic]]:
-    if layout is None:
-        return {}
-    return {
-        "layout_starts": layout.starts,
-        "layout_is_euler": layout.is_euler,
-        "layout_counts": np.array([layout.n_numbers, layout.translation, layout.scale]),
-    }
-
-
-def _field_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
-    arrays: dict[str, NDArray[np.generic]] = {}
-    for index, field in enumerate(figure.fields):
-        for key in ("name", "title", "unit"):
-            arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))
-        arrays[f"field_{index}_values"] = field.values
-        if field.names:
-            arrays[f"field_{index}_names"] = np.array(field.names)
-    return arrays

@@ -75,7 +75,31 @@ def read(source: Source) -> Figure:
             looks=optional(" ({})", looks),
         )
     source.remember("joints", lambda joint: joints[joint].start)
-    skeleton, dofs = _skeleton(source, joints)
+    n_joints = len(joints)
+    # The root's translations come first, as in the channels of .anim.
+    kinds = np.concatenate([np.arange(6), np.tile([3, 4, 5], n_joints - 1)])
+    owners = np.concatenate([np.zeros(6, int), np.repeat(np.arange(1, n_joints), 3)])
+    rotation_limits = np.tile([-np.inf, np.inf], (3 * n_joints, 1))
+    for index, joint in enumerate(joints):
+        for axis, (values, _) in joint.limits.items():
+            rotation_limits[3 * index + axis] = values
+    _check_limits(source, joints, rotation_limits)
+    limits = np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), rotation_limits])
+    dofs = np.concatenate([np.zeros(3), np.array([joint.pose for joint in joints]).ravel()])
+    corners = np.array([[joint.boxmin, joint.boxmax] for joint in joints])
+    skeleton = Skeleton(
+        names=tuple(joint.name for joint in joints),
+        parents=np.array([joint.parent for joint in joints], dtype=np.int32),
+        rest_translations=np.array([joint.offset for joint in joints]),
+        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (n_joints, 1)),
+        rest_scales=np.ones((n_joints, 3)),
+        dof_joints=owners,
+        dof_kinds=kinds,
+        rest_dofs=np.clip(dofs, limits[:, 0], limits[:, 1]),
+        dof_limits=limits,
+        # The file may swap minimum and maximum along an axis, which would turn the box inside out.
+        boxes=np.sort(corners, axis=1),
+    )
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
 
 
@@ -177,36 +201,6 @@ class _Parser(JointParser[_Joint]):
         return True
 
 
-def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
-    """Return the skeleton, and its pose as written in the file."""
-    n_joints = len(joints)
-    # The root's translations come first, as in the channels of .anim.
-    kinds = np.concatenate([np.arange(6), np.tile([3, 4, 5], n_joints - 1)])
-    owners = np.concatenate([np.zeros(6, int), np.repeat(np.arange(1, n_joints), 3)])
-    rotation_limits = np.tile([-np.inf, np.inf], (3 * n_joints, 1))
-    for index, joint in enumerate(joints):
-        for axis, (values, _) in joint.limits.items():
-            rotation_limits[3 * index + axis] = values
-    _check_limits(source, joints, rotation_limits)
-    limits = np.concatenate([np.tile([-np.inf, np.inf], (3, 1)), rotation_limits])
-    dofs = np.concatenate([np.zeros(3), np.array([joint.pose for joint in joints]).ravel()])
-    corners = np.array([[joint.boxmin, joint.boxmax] for joint in joints])
-    skeleton = Skeleton(
-        names=tuple(joint.name for joint in joints),
-        parents=np.array([joint.parent for joint in joints], dtype=np.int32),
-        rest_translations=np.array([joint.offset for joint in joints]),
-        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (n_joints, 1)),
-        rest_scales=np.ones((n_joints, 3)),
-        dof_joints=owners,
-        dof_kinds=kinds,
-        rest_dofs=np.clip(dofs, limits[:, 0], limits[:, 1]),
-        dof_limits=limits,
-        # The file may swap minimum and maximum along an axis, which would turn the box inside out.
-        boxes=np.sort(corners, axis=1),
-    )
-    return skeleton, dofs
-
-
 def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
     """Remove limits of +-100000, which mean "none", and contradictory limits; in place."""
     limits[limits[:, 0] <= -_UNLIMITED, 0] = -np.inf
@@ -256,14 +250,15 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
         raise _unsupported(
             "F002.skel-none: figure {figure} has no skeleton to write as .skel", figure=figure.name
         )
-    _check_dofs(figure.skeleton)
-    _check_numbers(figure.skeleton)
-    _check_names(figure.skeleton)
+    _check_storable(figure.skeleton)
     save_text(path, "".join(_lines(figure.skeleton)))
     return []
 
 
-def _check_dofs(skeleton: Skeleton) -> None:
+def _check_storable(skeleton: Skeleton) -> None:
+    """Refuse rest rotations, other DOFs than the format has, large numbers, and names."""
+    from viewer.media.saving import as_words
+
     unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
     unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
     if not (unturned and unscaled):
@@ -284,8 +279,6 @@ def _check_dofs(skeleton: Skeleton) -> None:
             "F002.skel-root: .skel cannot store a root translation in the pose, or its limits"
         )
 
-
-def _check_numbers(skeleton: Skeleton) -> None:
     limits = skeleton.dof_limits
     finite = np.isfinite(limits)
     if (finite & np.stack([limits[:, 0] <= -_UNLIMITED, limits[:, 1] >= _UNLIMITED], 1)).any():
@@ -297,10 +290,6 @@ def _check_numbers(skeleton: Skeleton) -> None:
         raise _unsupported(
             "F002.skel-numbers: .skel cannot store numbers beyond ±{most}", most=rounded(LARGEST)
         )
-
-
-def _check_names(skeleton: Skeleton) -> None:
-    from viewer.media.saving import as_words
 
     ancestors: list[int] = []
     for joint, parent in enumerate(skeleton.parents):

@@ -56,27 +56,23 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
         return DEFAULT_RATE
     is_own = len(frame_time.partition(b".")[2]) >= _DECIMALS
     if _LONGEST <= seconds <= max(_RATES) and not is_own:
-        return _mistaken_rate(source, frame_time, seconds)
+        # No frame takes that many seconds: the number is a rate, or in milliseconds.
+        is_standard = _nearest_rate(frame_time, seconds) in _RATES
+        in_milliseconds = _nearest_rate(frame_time, 1000.0 / seconds)
+        is_rate_written = is_standard or seconds.is_integer() or in_milliseconds not in _RATES
+        rate = seconds if is_rate_written else in_milliseconds
+        source.warn(
+            "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a frame "
+            "rate; {rate:g} fps assumed ({remedy} overrides it)"
+            if is_rate_written
+            else "C017.bvh-milliseconds: Frame Time: expected seconds, found {found}, which looks "
+            "like milliseconds; {rate:g} fps assumed ({remedy} overrides it)",
+            found=bare(frame_time),
+            rate=rate,
+            remedy=Remedy("Frames per second in the Timeline", "--fps"),
+        )
+        return rate
     return _nearest_rate(frame_time, 1.0 / seconds)
-
-
-def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
-    """Return the frame rate of a file whose frame time cannot be in seconds, and warn."""
-    is_standard = _nearest_rate(frame_time, seconds) in _RATES
-    in_milliseconds = _nearest_rate(frame_time, 1000.0 / seconds)
-    is_rate_written = is_standard or seconds.is_integer() or in_milliseconds not in _RATES
-    rate = seconds if is_rate_written else in_milliseconds
-    source.warn(
-        "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a frame "
-        "rate; {rate:g} fps assumed ({remedy} overrides it)"
-        if is_rate_written
-        else "C017.bvh-milliseconds: Frame Time: expected seconds, found {found}, which looks "
-        "like milliseconds; {rate:g} fps assumed ({remedy} overrides it)",
-        found=bare(frame_time),
-        rate=rate,
-        remedy=Remedy("Frames per second in the Timeline", "--fps"),
-    )
-    return rate
 
 
 def _nearest_rate(frame_time: bytes, exact: float) -> float:

@@ -325,7 +325,19 @@ def _corners(rows: _Rows, begins: Places) -> tuple[_Corners, Bools]:
             table = np.zeros((len(begins), 3), dtype=np.int32)
             table[:, columns] = whole.reshape(-1, len(columns))
             return table, np.zeros(len(begins), np.bool_)
-    fits, n_numbers, has_gap = _fits_corner(rows, begins)
+    # Which corners are v, v/vt, v//vn or v/vt/vn, how many numbers they have, which are v//vn.
+    number_begins = word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
+    slashes = np.flatnonzero(rows.letters == _SLASH)
+    after = np.append(begins[1:], len(rows.letters))
+    n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
+    n_numbers = np.searchsorted(number_begins, after) - np.searchsorted(number_begins, begins)
+    # Only the middle number may be missing, as in "1//3": "1/", "/1" and "1///2" are invalid.
+    doubles = slashes[:-1][np.diff(slashes) == 1]
+    has_gap = np.searchsorted(doubles, after) - np.searchsorted(doubles, begins) == 1
+    fits = np.where(has_gap, (n_slashes == 2) & (n_numbers == 2), n_numbers == n_slashes + 1)
+    fits &= (
+        (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
+    )
     firsts = np.cumsum(n_numbers) - n_numbers
     numbers = np.zeros((len(begins), 3))
     numbers[fits, 0] = values[firsts[fits]]
@@ -361,23 +373,6 @@ def _common_columns(rows: _Rows, begins: Places) -> list[int] | None:
     if (gaps == 1).all():
         return [0, 2]
     return [0, 1, 2] if (gaps > 1).all() else None
-
-
-def _fits_corner(rows: _Rows, begins: Places) -> tuple[Bools, Places, Bools]:
-    """Classify corners (C,): is it v, v/vt, v//vn or v/vt/vn, its count of numbers, is it v//vn."""
-    number_begins = word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
-    slashes = np.flatnonzero(rows.letters == _SLASH)
-    after = np.append(begins[1:], len(rows.letters))
-    n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
-    n_numbers = np.searchsorted(number_begins, after) - np.searchsorted(number_begins, begins)
-    # Only the middle number may be missing, as in "1//3": "1/", "/1" and "1///2" are invalid.
-    doubles = slashes[:-1][np.diff(slashes) == 1]
-    has_gap = np.searchsorted(doubles, after) - np.searchsorted(doubles, begins) == 1
-    fits = np.where(has_gap, (n_slashes == 2) & (n_numbers == 2), n_numbers == n_slashes + 1)
-    fits &= (
-        (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
-    )
-    return fits, n_numbers, has_gap
 
 
 def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:

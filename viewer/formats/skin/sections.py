@@ -596,35 +596,7 @@ def _faulty_influences(source: Source, block: _Block, count: int) -> Influences:
     owners = np.repeat(np.arange(len(heads)), counts)
     # The joint of an influence comes after the vertex's count and two words per earlier influence.
     places = heads[owners] + 1 + 2 * (np.arange(len(owners)) - starts[owners])
-    joints, weights = _faulty_pairs(source, words, places, owners)
-    offsets = words.offsets[heads]
-    return starts, joints, weights, lambda vertex: int(offsets[vertex])
-
-
-def _refuse_lines(
-    source: Source, words: Words, heads: _Places, vertices: _Places, after: _Places
-) -> None:
-    """Refuse lines whose number of words contradicts their first word."""
-    if len(vertices) == 0:
-        return
-    vertex = int(vertices[0])
-    head = int(heads[vertex])
-    is_count = words.values[head] >= 0 and words.values[head] % 1 == 0
-    key, values = wording.SKIN_INFLUENCE_COUNT, dict[str, object](found=quoted(words.word(head)))
-    if is_count:
-        key = (
-            "F002.skin-influences: skinweights of vertex {vertex}: expected {pairs} "
-            "joint-weight pairs, found {found} numbers on the line"
-        )
-        values = {"pairs": bare(words.word(head)), "found": int(after[vertex]) - head - 1}
-    offset, count = int(words.offsets[head]), len(vertices)
-    source.refuse(key, offset, count, "weights", vertices, vertex=vertex, **values)
-
-
-def _faulty_pairs(
-    source: Source, words: Words, places: _Places, owners: _Places
-) -> tuple[Ints, Floats]:
-    """Return joints and weights; both are 0 if either is not a number."""
+    # Both joint and weight become 0 if either is not a number.
     joints, weights = words.values[places], words.values[places + 1]
     bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
     at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)
@@ -654,7 +626,29 @@ def _faulty_pairs(
             found=quoted(words.word(place)),
         )
     lost = np.isnan(joints) | np.isnan(weights) | (whole != joints)
-    return np.where(lost, 0, whole).astype(np.int32), np.where(lost, 0.0, weights)
+    kept = np.where(lost, 0, whole).astype(np.int32), np.where(lost, 0.0, weights)
+    offsets = words.offsets[heads]
+    return starts, *kept, lambda vertex: int(offsets[vertex])
+
+
+def _refuse_lines(
+    source: Source, words: Words, heads: _Places, vertices: _Places, after: _Places
+) -> None:
+    """Refuse lines whose number of words contradicts their first word."""
+    if len(vertices) == 0:
+        return
+    vertex = int(vertices[0])
+    head = int(heads[vertex])
+    is_count = words.values[head] >= 0 and words.values[head] % 1 == 0
+    key, values = wording.SKIN_INFLUENCE_COUNT, dict[str, object](found=quoted(words.word(head)))
+    if is_count:
+        key = (
+            "F002.skin-influences: skinweights of vertex {vertex}: expected {pairs} "
+            "joint-weight pairs, found {found} numbers on the line"
+        )
+        values = {"pairs": bare(words.word(head)), "found": int(after[vertex]) - head - 1}
+    offset, count = int(words.offsets[head]), len(vertices)
+    source.refuse(key, offset, count, "weights", vertices, vertex=vertex, **values)
 
 
 def _no_influences(
