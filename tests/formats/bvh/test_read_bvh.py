@@ -50,6 +50,20 @@ def test_reads_every_part():
     assert ("frames", "2 at 30 fps") in motion.figure.facts
 
 
+@pytest.mark.parametrize("part", (1, 7, 40))
+@pytest.mark.parametrize("breaks", ("\n", "\r\n", "\r", " "))
+def test_frames_are_read_in_parts_of_any_length(monkeypatch, part, breaks):
+    """The numbers of a part need not fill its last frame."""
+    monkeypatch.setattr("viewer.formats.bvh.motion.PART", part)
+    head, rows = GOOD.split("Frame Time: 0.0333333\n")
+    numbers = rows.split()
+    for step in (4, 15, len(numbers)):
+        lines = [" ".join(numbers[at : at + step]) for at in range(0, len(numbers), step)]
+        motion, warnings = read(f"{head}Frame Time: 0.0333333\n{breaks.join(lines)}\n")
+        assert warnings == []
+        np.testing.assert_array_equal(worlds(motion), worlds(read(GOOD)[0]))
+
+
 def test_joint_positions_follow_the_channels():
     motion, _ = read(GOOD)
     places = worlds(motion)[..., :3, 3]
