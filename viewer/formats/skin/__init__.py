@@ -30,6 +30,7 @@ from viewer.formats._placeholders import neutral_corners, neutral_positions
 from viewer.formats._polygons import filled_normals
 from viewer.formats._references import load_image
 from viewer.formats._source import Source
+from viewer.formats._text.number_text import row_texts
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.skin.sections import (
     KEYWORDS,
@@ -329,8 +330,6 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
 
 
 def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
-    from viewer.formats._text.number_text import row_texts
-
     return _section(name, len(rows), row_texts(rows, start=b"  "))
 
 
@@ -341,8 +340,6 @@ def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[byt
 
 def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
     """Return the triangles sections, each after its material, as assigned by the reader."""
-    from viewer.formats._text.number_text import row_texts
-
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
     parts: list[Iterable[bytes]] = []
