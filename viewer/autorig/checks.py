@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.autorig.transfer.joint_transfer import outside
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
@@ -77,16 +77,16 @@ def check_lines(
             vertices,
             values,
         )
-    yield Diagnostic(
+    yield note(
         "R011.residual: after posing, the mesh differs from the target by at most "
         "{residual:.3%} of its size",
-        values={"residual": residual},
+        residual=residual,
     )
     if residual > _EXACT and not len(vertices):
-        yield Diagnostic(
+        yield note(
             "R012.residual: after posing, the mesh differs from the target by more than "
             "{limit:.2%} of its size",
-            values={"limit": _EXACT},
+            limit=_EXACT,
         )
 
 

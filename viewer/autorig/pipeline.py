@@ -30,7 +30,7 @@ from viewer.autorig.transfer.joint_transfer import boundary_weights, surface_shi
 from viewer.autorig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.progress import part_of_work, report_fraction
@@ -142,7 +142,7 @@ def _transferred_skeleton(
     joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "alignment":
         rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
-        return rest, None, [Diagnostic("R008.aligned: joints: aligned with the template")]
+        return rest, None, [note("R008.aligned: joints: aligned with the template")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(aligned, mesh.triangles)
     ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
@@ -177,9 +177,9 @@ def _transferred_skeleton(
         rest,
         found.transferred,
         [
-            Diagnostic(
+            note(
                 "R008.transferred: joints: {n} of {all} transferred using {by}{missed}{without}",
-                values=values,
+                **values,
             )
         ],
     )
@@ -237,18 +237,18 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> Iterat
     """Return messages about the target's winding and unit."""
     n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if n_reversed:
-        yield Diagnostic(
+        yield note(
             "R014.wound: {n} wound inside out: reversed in the result",
-            values={"n": counted(n_reversed, "triangle")},
+            n=counted(n_reversed, "triangle"),
         )
     if template.unit in UNIT_NAMES:
         if figure.unit in UNIT_NAMES:
-            yield Diagnostic(
+            yield note(
                 "R014.unit: unit estimated from the size: {unit}",
-                values={"unit": UNIT_NAMES[figure.unit]},
+                unit=UNIT_NAMES[figure.unit],
             )
         else:
-            yield Diagnostic(
+            yield note(
                 "R014.unit-unknown: unit unknown, because the target is much larger or smaller "
                 "than the template"
             )
@@ -257,9 +257,9 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> Iterat
 def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> Iterator[Diagnostic]:
     """Return messages about template data that is missing in the new figure."""
     if template.blend_shapes is not None:
-        yield Diagnostic(
+        yield note(
             "R013.shapes: {n} of the template not transferred",
-            values={"n": counted(template.n_shapes, "blend shape")},
+            n=counted(template.n_shapes, "blend shape"),
         )
     if template.correctives is not None and figure.correctives is None:
         key = (
@@ -268,7 +268,7 @@ def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> I
             if how.correctives
             else "R013.correctives: pose correctives of the template omitted"
         )
-        yield Diagnostic(key)
+        yield note(key)
 
 
 def _parts(figure: Figure) -> str:

@@ -11,7 +11,7 @@ from viewer.autorig.checks import check_lines, newly_outside, residual_of
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.transfer.inverse_skinning import invert_skinning
 from viewer.autorig.weights.weight_transfer import nearest_weights
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import rounded
 from viewer.progress import report_fraction
@@ -57,16 +57,16 @@ def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
         "ratio": float(weights.matched.mean()),
     }
     lines = (
-        Diagnostic(
+        note(
             "R001.boxes: alignment: bounding boxes; target scaled along x, y, z by {x}, {y}, {z}",
-            values=factors,
+            **factors,
         ),
-        Diagnostic(
+        note(
             "R005.all-nearest: matched {n} of {all} vertices ({ratio:.1%}); all take the "
             "weights of the nearest vertex",
-            values=matched,
+            **matched,
         ),
-        Diagnostic("R008.copied: joints: copied from the template"),
+        note("R008.copied: joints: copied from the template"),
         *check_lines(figure, found.guarded, out, residual),
     )
     return Rigged(

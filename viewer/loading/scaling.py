@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -22,10 +22,11 @@ def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
     actor.placement = scaling(factor) @ actor.placement
     values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
     return [
-        Diagnostic(
+        note(
             "F007.unit-matched: {figure} is in {unit}: scaled by {factor:g} to match the "
             "scene, which is in {wanted}",
-            values={**values, "factor": factor},
+            **values,
+            factor=factor,
         )
     ]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class SceneDraft:
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
         """Record a message, with the values of its template, about a file if ``path`` is given."""
-        self.diagnostics.append(Diagnostic(key, path, values=values))
+        self.diagnostics.append(note(key, path, **values))
 
     def note_motions(self, path: Path) -> None:
         """Record the file of the motions that actors have received since the last call."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import rounded
 from viewer.rig.arrays import Floats
@@ -35,7 +35,7 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
         else "F007.coefficient-left-out: {group} coefficient {last} omitted (largest value "
         "{largest}): {figure} has {most}"
     )
-    return [Diagnostic(key, values=values_shown)]
+    return [note(key, **values_shown)]
 
 
 def space_misfit(space: ShapeSpace, figure: Figure) -> Diagnostic | None:
@@ -47,16 +47,16 @@ def space_misfit(space: ShapeSpace, figure: Figure) -> Diagnostic | None:
     own = figure.shape_space
     values = {"figure": figure.name, "own": own.title, "other": space.title}
     if not space.shares_coefficients(own):
-        return Diagnostic(
+        return note(
             "C019.model: shape coefficients of {other} omitted: they do not apply to {own} "
             "({figure})",
-            values=values,
+            **values,
         )
     if own.gender and space.gender and own.gender != space.gender:
-        return Diagnostic(
+        return note(
             "C019.gender: made for a {other} body, but {figure} is {own}: size and shape "
             "differ from the file's",
-            values=values,
+            **values,
         )
     return None
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints, freeze_fields
@@ -125,4 +125,4 @@ def _check_vertices(target: MorphTarget, figure: Figure, count: int) -> None:
 
 def _refusal(key: str, target: MorphTarget, figure: Figure, **values: object) -> RigError:
     """Return the error for a target that does not match a figure."""
-    return RigError(Diagnostic(key, values={"morph": target.name, "figure": figure.name, **values}))
+    return RigError(note(key, morph=target.name, figure=figure.name, **values))

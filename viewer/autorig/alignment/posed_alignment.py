@@ -28,7 +28,7 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats
@@ -154,24 +154,20 @@ def _if_better(
     if after > (_PART_KEPT if is_part else _KEPT) * before:
         return replace(
             kept,
-            lines=(
-                Diagnostic(
-                    "R003.not-fitted: pose: not fitted, because {gap} would remain", values=gap
-                ),
-            ),
+            lines=(note("R003.not-fitted: pose: not fitted, because {gap} would remain", **gap),),
         )
     if after <= _POOR:
-        return replace(found, lines=(*found.lines, Diagnostic(wording.GAP, values=gap)))
+        return replace(found, lines=(*found.lines, note(wording.GAP, **gap)))
     if bent > _BENT:
         values = {**gap, "joint": name, "angle": float(np.degrees(bent))}
         return replace(
             kept,
             lines=(
-                Diagnostic(
+                note(
                     "R004.not-fitted: pose: not fitted, because {joint} would rotate by "
                     "{angle:.0f} "
                     "degrees and {gap} would remain; use a template of the same kind as the target",
-                    values=values,
+                    **values,
                 ),
             ),
         )
@@ -179,9 +175,9 @@ def _if_better(
         found,
         lines=(
             *found.lines,
-            Diagnostic(
+            note(
                 "R004.gap: poor fit: {gap}; use a template of the same kind as the target",
-                values=gap,
+                **gap,
             ),
         ),
     )
@@ -241,11 +237,11 @@ def _stretched(
         kept,
         alignment=alignment,
         lines=(
-            Diagnostic(
+            note(
                 "R003.proportions: proportions: template stretched by {scales}, pose kept",
-                values={"scales": _scales(alignment.similarity)},
+                scales=_scales(alignment.similarity),
             ),
-            Diagnostic(wording.GAP, values={"gap": _gap(after, before)}),
+            note(wording.GAP, gap=_gap(after, before)),
         ),
     )
     return found if _is_closer(found, kept) else None
@@ -271,14 +267,12 @@ def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
         "{scales} ({gap:.2f} % of the size apart instead of {kept:.2f} %): use {remedy} if "
         "the target was stretched"
     )
-    return Diagnostic(
+    return note(
         key,
-        values={
-            "scales": _scales(similarity),
-            "gap": gap,
-            "kept": other,
-            "remedy": Remedy("another Scale", "--scale axes"),
-        },
+        scales=_scales(similarity),
+        gap=gap,
+        kept=other,
+        remedy=Remedy("another Scale", "--scale axes"),
     )
 
 
@@ -322,10 +316,10 @@ def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
         "change": 100.0 * float(np.expm1(found.grown[0, longest])),
     }
     return (
-        Diagnostic(
+        note(
             "R003.pose: pose: template joints rotated to fit, by up to {angle:.0f} degrees "
             "({joint}); limb lengths changed by up to {change:+z.0f} % ({limb})",
-            values=values,
+            **values,
         ),
     )
 

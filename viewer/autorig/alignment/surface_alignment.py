@@ -21,7 +21,7 @@ from viewer.autorig.alignment.orientation_search import axis_rotations, in_place
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
@@ -266,27 +266,26 @@ def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
     }
     errors = {"error": 100.0 * alignment.error, "away": 100.0 * alignment.away}
     lines = [
-        Diagnostic(
+        note(
             "R001.alignment: alignment: {how}; scale {scale}{factors}, rotation {angle:.2f} "
             "degrees, translation ({x:z.4g}, {y:z.4g}, {z:z.4g})",
-            values={**values, **_by_axis(similarity.shift)},
+            **values,
+            **_by_axis(similarity.shift),
         ),
-        Diagnostic(
+        note(
             "R001.error: alignment error: {error:.2f} % of the target's size (RMS of the best "
             "90 %), {away:.2f} % from template to target",
-            values=errors,
+            **errors,
         ),
     ]
     if alignment.error > _BAD:
         lines.append(
-            Diagnostic(
+            note(
                 "R002.error: unreliable alignment, with an error above {limit:g} %: specify "
                 "{remedy}, or pose the template like the target ({remedy2})",
-                values={
-                    "limit": 100.0 * _BAD,
-                    "remedy": Remedy("Up, Facing or landmarks", "--up, --facing or --landmarks"),
-                    "remedy2": Remedy("Pose it", "--template-pose"),
-                },
+                limit=100.0 * _BAD,
+                remedy=Remedy("Up, Facing or landmarks", "--up, --facing or --landmarks"),
+                remedy2=Remedy("Pose it", "--template-pose"),
             )
         )
     return lines

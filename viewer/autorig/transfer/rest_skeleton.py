@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -196,9 +196,9 @@ def _rotate_roots(
     left = wanted[~ball] @ np.swapaxes(held, 1, 2)
     pose.rotations[others] = matrix_to_quaternion(left)
     lines = [
-        Diagnostic(
+        note(
             "R008.limits-widened: limits of {joint} widened to include the target's pose",
-            values={"joint": joint_label(skeleton, int(joint))},
+            joint=joint_label(skeleton, int(joint)),
         )
         for joint in roots[ball][beyond]
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.autorig.correspondence import Matches
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import agree, counted
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
@@ -78,9 +78,9 @@ def template_lines(skin: Skin) -> Iterator[Diagnostic]:
     negative = int((skin.weights < 0.0).sum())
     if not negative:
         return
-    yield Diagnostic(
+    yield note(
         "R005.negative-weights: {n} of the template treated as 0",
-        values={"n": counted(negative, "negative weight")},
+        n=counted(negative, "negative weight"),
     )
 
 
@@ -93,29 +93,27 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> Iterator[Diagn
         "ratio": ratio,
         "inpainted": int(inpainted.sum()),
     }
-    yield Diagnostic(
+    yield note(
         "R005.matched: matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
-        values=values,
+        **values,
     )
     if ratio < _FEW:
-        yield Diagnostic(
+        yield note(
             "R006.matched: less than {limit:.0%} of the target matches the template: check the "
             "alignment or allow a larger distance",
-            values={"limit": _FEW},
+            limit=_FEW,
         )
     if len(found.inside_out):
-        yield Diagnostic(
+        yield note(
             "R005.reversed: {n} of the target {are} wound opposite to the template: matched "
             "with reversed normals",
-            values={
-                "n": counted(len(found.inside_out), "part"),
-                "are": agree(len(found.inside_out), "is", "are"),
-            },
+            n=counted(len(found.inside_out), "part"),
+            are=agree(len(found.inside_out), "is", "are"),
         )
     if method != "direct":
-        yield Diagnostic(
+        yield note(
             "R005.solver: weights inpainted with the fallback solver: {method}",
-            values={"method": method},
+            method=method,
         )
 
 
@@ -123,18 +121,17 @@ def rigid_lines(rigid: RigidIslands) -> Iterator[Diagnostic]:
     """Return a message for each of the largest rigid islands, and one for the others."""
     order = np.argsort(-rigid.counts, kind="stable")
     for island in order[:_LISTED]:
-        yield Diagnostic(
+        yield note(
             "R007.part: the part of {n} at vertex {vertex} has no match in the template: it "
             "moves rigidly, mostly with joint {joint}",
-            values={
-                "n": counted(int(rigid.counts[island]), "vertex"),
-                "vertex": int(rigid.vertices[island]),
-                "joint": int(rigid.joints[island]),
-            },
+            n=counted(int(rigid.counts[island]), "vertex"),
+            vertex=int(rigid.vertices[island]),
+            joint=int(rigid.joints[island]),
         )
     more = len(order) - _LISTED
     if more > 0:
-        yield Diagnostic(
+        yield note(
             "R007.more-parts: {n} also {move} rigidly",
-            values={"n": counted(more, "smaller part"), "move": agree(more, "moves", "move")},
+            n=counted(more, "smaller part"),
+            move=agree(more, "moves", "move"),
         )

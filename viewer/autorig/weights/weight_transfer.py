@@ -32,7 +32,7 @@ from viewer.autorig.weights.result import (
     template_lines,
 )
 from viewer.data_classes import dataclass, setting
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -174,9 +174,10 @@ def nearest_weights(template: Floats, weights: Skin, positions: Floats) -> Weigh
         backwards=np.zeros(len(near), dtype=bool),
         rigid=RigidIslands(empty, empty, empty, np.zeros(0)),
         lines=(
-            Diagnostic(
+            note(
                 "R005.nearest: nearest vertex within the limit for {n} of {all} vertices",
-                values={"n": int(near.sum()), "all": len(near)},
+                n=int(near.sum()),
+                all=len(near),
             ),
         ),
     )
