@@ -19,7 +19,7 @@ from viewer.loading.settings import CleanUp
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.retargeting.feet import plant_feet
-from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor, Scene
 
 MOTIONS = {
@@ -93,7 +93,7 @@ def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path):
     parents[[figure.skeleton.names.index(f"{side}_ankle") for side in ("left", "right")]] = 0
     figure = replace(figure, skeleton=replace(figure.skeleton, parents=parents))
     motion = written(t_pose(), *walk(), rate=RATE)
-    found = retargeted(motion, figure)
+    found = retarget(motion, figure)
     assert plant_feet(found, figure) == (found.clip, None)
 
 

@@ -46,7 +46,7 @@ def walker(drive):
 def test_check_box_turns_planted_feet_off_and_undo_restores_them(walker):
     hand, actor = walker, walker.state.actor
     before = actor.clip
-    plain, _ = retarget(actor.drive.motion, actor.figure)
+    plain = retarget(actor.drive.motion, actor.figure).clip
     assert plants_feet(hand.state) and no_edit(hand.state) == ""
     hand.state.clock.seek(0.5)
     hand.step(2)
@@ -81,7 +81,7 @@ def test_long_motions_are_retargeted_in_the_background(walker, monkeypatch):
     toggle_feet(hand.state)  # refused while the job runs
     assert hand.state.job is job and hand.says("wait for: Retargeting")
     hand.finish_job()
-    plain, _ = retarget(actor.drive.motion, actor.figure)
+    plain = retarget(actor.drive.motion, actor.figure).clip
     assert not plants_feet(hand.state) and hand.says("Feet: as retargeted")
     np.testing.assert_array_equal(actor.clip.rotations, plain.rotations)
     hand.key("z", "ctrl")
@@ -200,7 +200,7 @@ def test_unexpected_errors_of_retargeting_are_shown(walker, monkeypatch, frames)
 
     before = actor.clip, actor.drive
     monkeypatch.setattr(driven_clip_module, "plant_feet", fails)
-    monkeypatch.setattr(driven_clip_module, "retargeted", fails)
+    monkeypatch.setattr(driven_clip_module, "retarget", fails)
     if frames > 1000:
         with pytest.raises(np.linalg.LinAlgError):
             toggle_feet(hand.state)

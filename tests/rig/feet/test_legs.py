@@ -12,7 +12,7 @@ from viewer.rig.feet.legs import Leg, animal_legs, bend, hinges, legs_of, loweri
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.retargeting.feet import plant_feet
-from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.shape import rest_joints
 
 FIGURE = legs()  # hips at y = 0.9, knees at 0.5, ankles at 0.1
@@ -157,7 +157,7 @@ def test_three_legs_or_two_points_are_not_an_animal():
 
 def test_paws_are_planted_in_the_stances_of_the_source_animal():
     figure = other_animal()
-    found = retargeted(trot(), figure)
+    found = retarget(trot(), figure)
     clip, changes = plant_feet(found, figure)
     assert changes.is_better and changes.after < changes.source
     old, new = places(figure, found.clip), places(figure, clip)

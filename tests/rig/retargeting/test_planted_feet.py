@@ -17,7 +17,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.feet import plant_feet
-from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.shape import rest_joints
 
 SIDES = ("Left", "Right")
@@ -51,7 +51,7 @@ OTHER = person(1.15, 0.85, 1.3, 1.4)
 
 def planted(figure: Figure = OTHER, axes: Floats | None = None, **how: float):
     motion = written(t_pose() if axes is None else axes, *walk(**how), rate=RATE)
-    found = retargeted(motion, figure, source_rest="auto")
+    found = retarget(motion, figure, source_rest="auto")
     return found, *plant_feet(found, figure)
 
 
@@ -171,7 +171,7 @@ def test_figure_with_the_proportions_of_the_source_is_unchanged():
 def test_feet_are_unchanged_if_the_source_never_stands():
     rotations, path = walk()
     path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s, as on a bicycle
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert clip is found.clip and changes.n_contacts == 0
 
@@ -186,7 +186,7 @@ def test_foot_held_still_in_the_air_is_not_planted():
     bent = axis_rotations(0, np.asarray(1.5))
     for name in ("RightLeg", "RightFoot", "RightToeBase"):
         rotations[:, NAMES.index(name)] = rotations[:, 0] @ bent
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     old, new = places(OTHER, found.clip), places(OTHER, clip)
     assert changes.n_contacts == 1
@@ -205,7 +205,7 @@ def test_motions_of_two_frames_or_with_gaps_are_supported():
         replace(motion.clip.timing, rows=rows[:2]),
     ):
         moving = replace(motion, clip=replace(motion.clip, timing=timing))
-        clip, _ = plant_feet(retargeted(moving, OTHER), OTHER)
+        clip, _ = plant_feet(retarget(moving, OTHER), OTHER)
         assert (clip.timing.present == timing.present).all()
 
 
@@ -225,7 +225,7 @@ def test_planting_can_be_switched_off_and_is_reported():
     motion = written(t_pose(), *walk(), rate=RATE)
     clip, notes = driven_clip(Drive(motion, plants_feet=False), OTHER)
     assert not any(note.key.startswith("F007.feet") for note in notes)
-    assert_allclose(clip.rotations, retargeted(motion, OTHER).clip.rotations, atol=0.0)
+    assert_allclose(clip.rotations, retarget(motion, OTHER).clip.rotations, atol=0.0)
     _, notes = driven_clip(Drive(motion), OTHER)
     text = str(next(note for note in notes if note.key == "F007.feet-planted"))
     assert "planted during 6 contacts" in text and "--feet off" in text
@@ -266,7 +266,7 @@ def test_legs_folded_at_rest_have_finite_rotations():
 def test_feet_of_a_lying_person_are_not_planted():
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     rotations[:] = axis_rotations(0, np.asarray(-np.pi / 2))
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert clip is found.clip and changes.n_contacts == 0
 
@@ -297,7 +297,7 @@ def test_swinging_feet_do_not_sink_into_the_ground():
         for part in ("Foot", "ToeBase"):  # the toes point down while the foot swings
             joint = NAMES.index(f"{side}{part}")
             rotations[:, joint] = pitch @ rotations[:, joint]
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.is_better
     before, after = places(OTHER, found.clip), places(OTHER, clip)

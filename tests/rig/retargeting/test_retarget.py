@@ -25,6 +25,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.retarget import retarget, scaled_motion
 
 SPINE = {"spine1": "spine", "spine2": "chest", "spine3": "upperChest"}
@@ -51,7 +52,8 @@ def assert_same_limbs(source: SkeletonMotion, figure: Figure, clip: SampledClip,
 
 def test_retargeting_onto_itself_is_the_identity():
     motion = moving(figure_of(HIK, "mocap"))
-    clip, notes = retarget(motion, motion.figure)
+    found = retarget(motion, motion.figure)
+    clip, notes = found.clip, found.notes
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
     np.testing.assert_allclose(clip.translations, motion.clip.translations, atol=1e-12 * 100)
@@ -67,14 +69,15 @@ def test_joints_with_repeated_names_are_matched_by_hierarchy():
     figure = figure_of(table, "snake")
     figure = replace(figure, skeleton=replace(figure.skeleton, names=("tail", "tail", "")))
     motion = moving(figure)
-    clip, _ = retarget(motion, figure)
+    clip = retarget(motion, figure).clip
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
 
 
 def test_limb_directions_match_the_source_from_t_pose_to_a_pose():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     assert_same_limbs(source, figure, clip)
     (key, values), *rest = told(notes)
     assert key == "F007.joints-matched-as-follows"
@@ -94,7 +97,7 @@ def test_limb_directions_match_the_source_from_t_pose_to_a_pose():
 def test_very_different_rest_pose_of_the_trunk_is_aligned():
     bowed = {**HIK, "Head": ("Neck", (0, 145, 12)), "Spine1": ("Spine", (0, 112, 14))}
     source, figure = moving(figure_of(bowed, "mocap")), figure_of(BODY, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     for pair, own in (
         (("Neck", "Head"), ("neck", "head")),
@@ -105,7 +108,7 @@ def test_very_different_rest_pose_of_the_trunk_is_aligned():
 
 def test_limb_directions_match_the_source_from_a_pose_to_t_pose():
     source, figure = moving(figure_of(BODY, "body")), figure_of(HIK, "mocap")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     for own, pair in LIMBS:
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
@@ -113,7 +116,7 @@ def test_limb_directions_match_the_source_from_a_pose_to_t_pose():
 
 def test_trunk_and_feet_keep_their_rest_shape():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     # In the rest pose of the source, the slightly bent spine of the figure keeps its shape.
     still = {"pelvis": 0, "spine1": 3, "spine3": 9, "neck": 10, "head": 13, "left_collar": 11}
     for name, joint in still.items():
@@ -131,7 +134,7 @@ def test_eyes_and_jaw_do_not_tilt_the_head():
         "jaw": ("head", (0.0, 1.45, 0.05)),
     }
     source, figure = moving(figure_of(HIK | high, "mocap")), figure_of(BODY | far, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     head = figure.skeleton.names.index("head")
     # The trunk of both people is upright.
     np.testing.assert_allclose(np.abs(clip.rotations[0, head, 3]), 1.0, atol=EXACT)
@@ -150,8 +153,8 @@ def test_result_does_not_depend_on_the_joint_axes_of_the_figure():
         worlds.append(above @ matrix(turns[joint]))
     turned = replace(skeleton, rest_rotations=turns, rest_translations=np.array(offsets))
     figure = replace(plain, skeleton=turned)
-    expected = places(plain, retarget(source, plain)[0])
-    found = places(figure, retarget(source, figure)[0])
+    expected = places(plain, retarget(source, plain).clip)
+    found = places(figure, retarget(source, figure).clip)
     for name, place in expected.items():
         np.testing.assert_allclose(found[name], place, atol=1e-12)
 
@@ -173,7 +176,7 @@ TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z)
 def test_source_with_z_up_is_rotated_upright():
     source = moving(figure_of(HIK, "mocap", TO_Y.T, "z"))
     figure = figure_of(BODY, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     assert_same_limbs(source, figure, clip, TO_Y)
     theirs = {name: way @ TO_Y.T for name, way in places(source.figure, source.clip).items()}
     assert_same_path(places(figure, clip), theirs)
@@ -201,7 +204,8 @@ def path_scale() -> float:
 
 def test_path_is_scaled_by_leg_length():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
     values = {"scale": pytest.approx(path_scale()), "by": "the ratio of leg lengths"}
     assert told(notes)[-1] == ("F007.path-scaled", values)
@@ -216,8 +220,9 @@ def test_path_in_a_different_unit_than_the_skeleton_is_scaled_by_leg_length():
         figure_scales=np.full(count, 0.01),
         figure_translations=np.tile(ahead, (count, 1)),
     )
-    clip, notes = retarget(replace(source, clip=metres), figure)
-    plain, moved = places(figure, retarget(source, figure)[0]), places(figure, clip)
+    found = retarget(replace(source, clip=metres), figure)
+    clip, notes = found.clip, found.notes
+    plain, moved = places(figure, retarget(source, figure).clip), places(figure, clip)
     scale = told(notes)[-1][1]["scale"]
     assert scale == pytest.approx(100.0 * path_scale())
     for name, place in plain.items():
@@ -228,9 +233,9 @@ def test_skinned_figure_moves_with_its_root():
     source, bare = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     corners = np.eye(3)
     figure = replace(bare, mesh=Mesh(corners, corners, np.array([[0, 1, 2]], dtype=np.int32)))
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     assert clip.translations is None
-    expected = places(bare, retarget(source, bare)[0])
+    expected = places(bare, retarget(source, bare).clip)
     for name, place in places(figure, clip).items():
         np.testing.assert_allclose(place, expected[name], atol=1e-12)
 
@@ -239,7 +244,7 @@ def test_source_with_a_different_front_at_rest_rotates_the_figure():
     quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # maps z, the front, to x
     source = moving(figure_of(HIK, "mocap", quarter))
     figure = figure_of(BODY, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     assert_same_limbs(source, figure, clip)
     where = places(figure, clip)
     # The line between the hips is along x at rest, and is aligned with the source's, along -z.
@@ -252,7 +257,7 @@ def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body", half)
     names = tuple(f"n{joint}" for joint in range(len(BODY)))
     skeleton = replace(figure.skeleton, names=names, humanoid=Humanoid(bones))
-    clip, _ = retarget(source, replace(figure, skeleton=skeleton))
+    clip = retarget(source, replace(figure, skeleton=skeleton)).clip
     assert_same_limbs(source, figure, clip)
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
 
@@ -261,7 +266,7 @@ def test_source_with_a_lying_rest_pose_stands_up_in_its_frames():
     down = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     source = moving(figure_of(HIK, "mocap", down))  # y is up, but the body is along z
     figure = figure_of(BODY, "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     assert_same_limbs(source, figure, clip)
 
 
@@ -272,7 +277,8 @@ def test_rotations_of_joints_between_matched_joints_are_included():
     order = [*list(HIK)[:14], "LeftArmRoll", *list(HIK)[14:]]
     source = moving(figure_of({name: table[name] for name in order}, "mocap"))
     figure = figure_of(BODY, "body")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(
         bones(mine, ("left_elbow", "left_wrist")),
@@ -286,7 +292,8 @@ def test_rotations_of_joints_between_matched_joints_are_included():
 def test_unmapped_joints_stay_at_rest_relative_to_their_parent():
     table = {**BODY, "jaw": ("head", (0.0, 1.52, 0.08)), "tail": ("pelvis", (0, 0.9, -0.2))}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     np.testing.assert_array_equal(clip.rotations[:, -2:], np.tile([0.0, 0, 0, 1], (5, 2, 1)))
     assert ("F007.joints-at-rest", {"names": ["spine2", "jaw", "tail"]}) in told(notes)
 
@@ -312,7 +319,7 @@ def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles():
     hang = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     source = moving(figure_of(with_fingers(HIK, "LeftHand", hik, np.eye(3)), "mocap"))
     figure = figure_of(with_fingers(BODY, "left_wrist", own, hang), "body")
-    clip, _ = retarget(source, figure)
+    clip = retarget(source, figure).clip
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     pairs = [
         ((hik[0], hik[2]), (own[0], own[2])),
@@ -339,7 +346,8 @@ def test_equal_hierarchy_with_different_proportions_receives_equal_rotations():
     ]
     table = {n: (BODY[n][0], tuple(np.array(BODY[n][1]) * [0.9, 1.1, 1.0])) for n in order}
     figure = figure_of(table, "two")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     for joint, name in enumerate(order):
         same = np.einsum(
             "na,na->n", clip.rotations[:, joint], source.clip.rotations[:, names.index(name)]
@@ -355,14 +363,19 @@ def test_joint_translations_are_transferred_between_equal_hierarchies():
     shifts = motion.clip.translations.copy()
     shifts[2:, 4] = 0.05, -0.01, 0.02
     motion = SkeletonMotion(figure, replace(motion.clip, translations=shifts))
-    clip, _ = retarget(motion, figure)
+    clip = retarget(motion, figure).clip
     np.testing.assert_allclose(clip.translations, shifts, atol=EXACT)
     bigger = scaled_motion(motion, 2.0).figure
-    clip, _ = retarget(motion, bigger)
+    clip = retarget(motion, bigger).clip
     np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
-    _, notes = retarget(motion, figure_of(HIK, "mocap"))
+    notes = retarget(motion, figure_of(HIK, "mocap")).notes
     values = {"n": 1, "most": pytest.approx(np.sqrt(0.003)), "joint": "left_knee"}
     assert told(notes)[-1] == ("F007.joint-positions-left-out", values)
+
+
+def joint_map(drivers: dict[str, str]) -> JointMap:
+    """Return a map from source joints and the target joints that they drive."""
+    return JointMap(tuple((target, source) for source, target in drivers.items()))
 
 
 def test_mapping_matches_names_without_rules():
@@ -374,7 +387,8 @@ def test_mapping_matches_names_without_rules():
     with pytest.raises(RigError):
         retarget(source, figure)
     arm = {"x0": "pelvis", "x13": "left_shoulder", "x14": "left_elbow", "x15": "left_wrist"}
-    clip, notes = retarget(source, figure, arm)
+    found = retarget(source, figure, joint_map(arm))
+    clip, notes = found.clip, found.notes
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(
         bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
@@ -398,7 +412,8 @@ def test_equal_names_match_without_a_known_meaning():
     }
     more = {**table, "sting": ("tail_02", (0, 0, 3))}
     source, figure = moving(figure_of(table, "snake")), figure_of(more, "wasp")
-    clip, notes = retarget(source, figure)
+    found = retarget(source, figure)
+    clip, notes = found.clip, found.notes
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(mine["tail_02"], theirs["tail_02"], atol=EXACT)
     values = {"motion": "snake", "figure": "wasp", "n": 3, "all": 4, "pairs": []}
@@ -442,7 +457,7 @@ def test_equal_names_match_without_a_known_meaning():
 def test_incompatible_figures_are_refused(mapping, key, values):
     snake = figure_of({"base": ("", (0, 0, 0)), "tail": ("base", (0, 0, 1))}, "snake")
     with pytest.raises(RigError) as caught:
-        retarget(moving(snake), figure_of(BODY, "body"), mapping)
+        retarget(moving(snake), figure_of(BODY, "body"), mapping and joint_map(mapping))
     found = caught.value.diagnostic
     assert found is not None and (found.key, found.values) == (key, values)
 
@@ -450,9 +465,9 @@ def test_incompatible_figures_are_refused(mapping, key, values):
 def test_gaps_are_preserved():
     motion = moving(figure_of(HIK, "mocap"))
     timing = Timing(25.0, np.array([0, 1, -1, -1, 2, 3, 4]), first_frame=7)
-    clip, _ = retarget(
+    clip = retarget(
         SkeletonMotion(motion.figure, replace(motion.clip, timing=timing)), figure_of(BODY, "b")
-    )
+    ).clip
     assert clip.timing is timing and clip.n_rows == 5
 
 
@@ -471,7 +486,11 @@ def test_scaled_motion_scales_all_lengths():
 
 
 def limb_warnings(motion: SkeletonMotion, figure: Figure, mapping=None) -> list[Diagnostic]:
-    return [note for note in retarget(motion, figure, mapping)[1] if note.code == "C018"]
+    return [
+        note
+        for note in retarget(motion, figure, mapping and joint_map(mapping)).notes
+        if note.code == "C018"
+    ]
 
 
 def renamed(table: dict, **names: str) -> dict:

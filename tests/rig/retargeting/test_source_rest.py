@@ -58,7 +58,8 @@ def body():
 
 def posed(body, motion, rest="auto"):
     """Return world matrices of the driven body, (N, J, 4, 4), and the messages."""
-    clip, notes = retarget(motion, body, source_rest=rest)
+    found = retarget(motion, body, source_rest=rest)
+    clip, notes = found.clip, found.notes
     times = np.arange(N_FRAMES) / 30.0
     found = world_frames(body, frames_of(body, clip, times)).copy()
     found[..., :3, 3] += clip.figure_translations[:, None]
@@ -207,7 +208,8 @@ def test_limbs_that_never_bend_are_reported(body):
 
 def test_motion_of_the_same_skeleton_keeps_its_rest_pose():
     motion = twin(along_x())
-    clip, notes = retarget(motion, motion.figure, source_rest="auto")
+    found = retarget(motion, motion.figure, source_rest="auto")
+    clip, notes = found.clip, found.notes
     assert not [key for key, _ in told(notes) if ".rest-" in key]
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
     np.testing.assert_allclose(same, 1.0, atol=1e-12)

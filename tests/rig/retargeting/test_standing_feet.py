@@ -17,7 +17,7 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.feet import plant_feet
-from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.retarget import retarget
 
 JOINTS = ("UpLeg", "Leg", "Foot")
 SHORT = person(0.8, 1.1, 0.9, 1.2)
@@ -61,7 +61,7 @@ MOTIONS = {"jump": lambda: jump()[:2], "kneel": kneel, "walk": walk, "jerky walk
 def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(figure, motion):
     rotations, path = MOTIONS[motion]()
     source = written(t_pose(), rotations, path, rate=RATE)
-    clip, changes = plant_feet(retargeted(source, figure), figure)
+    clip, changes = plant_feet(retarget(source, figure), figure)
     assert changes.is_better and changes.gap_after < (0.1 if "jerky" in motion else EXACT)
     # In the jump, the source's feet do not slide at all; half a millimetre is allowed.
     assert changes.after <= max(changes.source, 0.05)
@@ -80,7 +80,7 @@ def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(figure, motion)
 
 def test_jump_leaves_the_ground_and_lands_on_it():
     rotations, path, rise = jump()
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.n_contacts == 4
     where = places(OTHER, clip)
@@ -92,7 +92,7 @@ def test_jump_leaves_the_ground_and_lands_on_it():
 
 
 def test_ball_of_a_foot_that_points_down_is_on_the_ground():
-    found = retargeted(written(t_pose(), *kneel(), rate=RATE), OTHER)
+    found = retarget(written(t_pose(), *kneel(), rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.gap_before > 1.0  # cm
     ball = places(OTHER, clip)["RightToeBase_"][KNEELING]
@@ -102,7 +102,7 @@ def test_ball_of_a_foot_that_points_down_is_on_the_ground():
 
 def test_feet_on_a_treadmill_are_held_as_on_the_ground():
     motions = [written(t_pose(), *parts, rate=RATE) for parts in (walk(), treadmill())]
-    found = [retargeted(motion, OTHER) for motion in motions]
+    found = [retarget(motion, OTHER) for motion in motions]
     (walked, first), (ran, second) = (plant_feet(each, OTHER) for each in found)
     assert first.ground_speed == 0.0
     assert_allclose(second.ground_speed, 60.0 * found[1].scale, rtol=1e-3)  # cm/s
@@ -113,7 +113,7 @@ def test_feet_on_a_treadmill_are_held_as_on_the_ground():
 def test_sliding_person_is_not_on_a_treadmill():
     rotations, path = treadmill()
     path[:, 2] -= 1.0 * np.arange(len(path))  # the body moves with the feet
-    _, changes = plant_feet(retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER), OTHER)
+    _, changes = plant_feet(retarget(written(t_pose(), rotations, path, rate=RATE), OTHER), OTHER)
     assert changes.n_contacts == 0 and changes.ground_speed == 0.0
 
 
@@ -124,7 +124,7 @@ def test_soles_are_level_while_those_of_a_tilted_source_are_on_the_ground():
         for part in ("Foot", "ToeBase"):
             joint = NAMES.index(f"{side}{part}")
             rotations[:, joint] = tilt @ rotations[:, joint]
-    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, _ = plant_feet(found, OTHER)
     for side in ("Left", "Right"):
         flags = stands(side) & np.roll(stands(side), 12) & np.roll(stands(side), -12)
@@ -142,9 +142,9 @@ def test_noise_of_standing_feet_does_not_affect_the_knees():
             joint = NAMES.index(f"{side}{part}")
             rotations[:, joint] = noise @ rotations[:, joint]
     source = written(t_pose(), rotations, path, rate=4.0 * RATE)
-    clip, _ = plant_feet(retargeted(source, OTHER), OTHER)
+    clip, _ = plant_feet(retarget(source, OTHER), OTHER)
     clean = replace(source, clip=written(t_pose(), *walk(), rate=4.0 * RATE).clip)
-    smooth, _ = plant_feet(retargeted(clean, OTHER), OTHER)
+    smooth, _ = plant_feet(retarget(clean, OTHER), OTHER)
     peaks = [
         np.abs(np.diff(knee_angles(places(OTHER, each), "Left", "_"), 2)).max()
         for each in (clip, smooth)
@@ -158,7 +158,7 @@ def test_feet_follow_a_sudden_jump_of_the_recording_instead_of_bending_the_knees
     jumped[30] += [1.5, -1.0, 0.0]  # cm, for one frame; the left foot stands
     rate = 4.0 * RATE
     clips = [
-        plant_feet(retargeted(written(t_pose(), rotations, way, rate=rate), OTHER), OTHER)[0]
+        plant_feet(retarget(written(t_pose(), rotations, way, rate=rate), OTHER), OTHER)[0]
         for way in (path, jumped)
     ]
     calm, wild = (places(OTHER, clip) for clip in clips)

@@ -18,7 +18,7 @@ from viewer.rig.retargeting.feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_alignment import rest_of
-from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
 
 # Pairs of joints that show the left side of a body, the most certain first.
@@ -29,7 +29,7 @@ _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
-    found = retargeted(drive.motion, figure, drive.joint_map, drive.source_rest)
+    found = retarget(drive.motion, figure, drive.joint_map, drive.source_rest)
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
         clip, changes = plant_feet(found, figure, drive.hangs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +29,6 @@ class JointMap:
     """The file, for messages."""
     lines: tuple[int, ...] = ()
     """Line of each pair in the file; empty without a file."""
-
-
-def map_from_pairs(mapping: Mapping[str, str]) -> JointMap:
-    """Return a joint map from source joints (keys) and the target joints that they drive."""
-    return JointMap(tuple((target, source) for source, target in mapping.items()))
 
 
 def joint_map_of(partners: Ints, source: Skeleton, target: Skeleton) -> JointMap:

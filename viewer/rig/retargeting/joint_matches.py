@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Ints
-from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs, mapped_partners
+from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, mapped_partners
 from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -46,27 +46,26 @@ class Matches:
 def match_joints(
     source: Skeleton,
     target: Skeleton,
-    mapping: Mapping[str, str] | JointMap | None,
+    joint_map: JointMap | None,
     titles: tuple[str, str],
     is_complete: bool = True,
 ) -> Matches:
-    """Match joints by mapping, then by the meaning of names, then by equal names.
+    """Match joints by a map, then by the meaning of names, then by equal names.
 
-    A mapping that equals the automatic match changes nothing. RigError if too few match although
-    ``is_complete``, or the mapping names a missing joint or one twice.
+    A map that equals the automatic match changes nothing. RigError if too few match although
+    ``is_complete``, or the map names a missing joint or one twice.
     """
     plain = _comparable(source.names), _comparable(target.names)
     meanings = joint_meanings(source), joint_meanings(target)
     own = _automatic(source, target, plain, meanings)
     partners, is_mapped = own, np.zeros(target.n_joints, dtype=bool)
-    if mapping:
-        chosen = mapping if isinstance(mapping, JointMap) else map_from_pairs(mapping)
-        partners = mapped_partners(chosen, source, target, titles)
+    if joint_map is not None:
+        partners = mapped_partners(joint_map, source, target, titles)
         is_mapped = partners != UNMAPPED
         _match_by_names(partners, plain, meanings)
     is_hierarchy = _has_same_hierarchy(source, target, plain) and np.array_equal(partners, own)
     is_enough = is_hierarchy or _is_enough(partners, meanings, plain)
-    if is_complete and not (is_enough or (mapping and (partners >= 0).any())):
+    if is_complete and not (is_enough or (joint_map is not None and (partners >= 0).any())):
         raise _misfit(source, target, partners, titles)
     origins = _origins(source, target, partners, meanings)
     if is_hierarchy:
@@ -78,7 +77,7 @@ def match_joints(
 
 
 def _automatic(source: Skeleton, target: Skeleton, plain: _Names, meanings: _Names) -> Ints:
-    """Return the source joint of each target joint without a mapping: (J,), -1 for none."""
+    """Return the source joint of each target joint without a map: (J,), -1 for none."""
     partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
     if _has_same_hierarchy(source, target, plain):
         partners[:] = [plain[0].index(name) for name in plain[1]]
@@ -88,14 +87,14 @@ def _automatic(source: Skeleton, target: Skeleton, plain: _Names, meanings: _Nam
 
 
 def _match_by_names(partners: Ints, plain: _Names, meanings: _Names) -> None:
-    """Match the joints that are not in the mapping, in place; -1 for those without a match."""
+    """Match the joints that are not in the map, in place; -1 for those without a match."""
     for names, known in ((meanings, None), (plain, meanings)):
         _match_equal(partners, names, known)
     partners[partners == UNMAPPED] = -1
 
 
 def _origins(source: Skeleton, target: Skeleton, partners: Ints, meanings: _Names) -> list[str]:
-    """Return how each joint is matched without a mapping; see ``Matches``."""
+    """Return how each joint is matched without a map; see ``Matches``."""
     is_stated = source.humanoid is not None or target.humanoid is not None
     placed = joints_by_place(source), joints_by_place(target)
     origins = []

@@ -61,29 +61,18 @@ _ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 def retarget(
     motion: SkeletonMotion,
     figure: Figure,
-    mapping: Mapping[str, str] | JointMap | None = None,
+    joint_map: JointMap | None = None,
     source_rest: SourceRest = "zero",
-) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a motion made for another skeleton as a clip of a figure, and notes.
+) -> Retargeted:
+    """Return a motion made for another skeleton as a clip of a figure, and how they match.
 
-    Joints are matched by ``mapping``, then by the names that many programs use for a body (see
+    Joints are matched by ``joint_map``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
     spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged. RigError
-    if too few joints match, the mapping names a missing joint, or a frame is missing.
+    if too few joints match, the map names a missing joint, or a frame is missing.
     """
-    found = retargeted(motion, figure, mapping, source_rest)
-    return found.clip, found.notes
-
-
-def retargeted(
-    motion: SkeletonMotion,
-    figure: Figure,
-    mapping: Mapping[str, str] | JointMap | None = None,
-    source_rest: SourceRest = "zero",
-) -> Retargeted:
-    """Return the result of ``retarget``, with the match of the two skeletons."""
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
@@ -94,7 +83,7 @@ def retargeted(
         )
     motion = _in_path_unit(motion)
     source = motion.figure.require_skeleton()
-    matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
+    matches = match_joints(source, target, joint_map, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
     rested: list[Diagnostic] = []
     if not job.is_same:
@@ -127,7 +116,7 @@ def retargeted(
         "F007.path-scaled: path of the root scaled by {scale}, {by}",
         values={"scale": rounded(scale), "by": by},
     )
-    idle = [] if mapping else _limbs_at_rest(motion, figure, matches, rotations)
+    idle = [] if joint_map is not None else _limbs_at_rest(motion, figure, matches, rotations)
     notes = [*matches.notes, *idle, *rested, scaled, *notes, *missing]
     return Retargeted(clip, notes, motion, matches, job.to_target, scale)
 
@@ -139,7 +128,7 @@ class Retargeted:
     clip: SampledClip
     """Motion of the figure."""
     notes: list[Diagnostic]
-    """Messages as returned by ``retarget``."""
+    """Messages about matched joints, the rest pose, and the scale of the path."""
     source: SkeletonMotion
     """The motion, with the rest pose that was used."""
     matches: Matches
