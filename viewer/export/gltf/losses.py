@@ -278,6 +278,7 @@ def _one_body(
     if primitive.targets is not None:
         directions = primitive.targets.dense()
         weights = keys.get((placed.node, "weights"), mesh.shape_weights[None])
+        # The shape of the first frame is the reference, to which later weights are relative.
         positions = positions + np.einsum("s,sva->va", weights[0], directions)
     joint = placed.part.joint
     # The comparison is in binding space.

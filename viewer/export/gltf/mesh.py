@@ -108,6 +108,8 @@ def _surface(part: Part, shape: Shape) -> _Surface:
         return _Surface(positions, normals, lengths, np.eye(3))
     matrix = skin.inverse_bind[part.joint]
     linear = matrix[:3, :3]
+    # With p' = M p = L p + t, a normal becomes n' = L^-T n, or as a row n L^-1. It is written with
+    # length 1, so the figure's length takes the factor that offsets of normals need, too.
     turned = normals @ np.linalg.inv(linear)
     stretch = np.linalg.norm(turned, axis=1, keepdims=True)
     return _Surface(apply_transform(matrix, positions), turned / stretch, lengths * stretch, linear)
@@ -389,6 +391,8 @@ class Encoding:
 
 def _summing(weights: Floats) -> NDArray[np.uint16]:
     """Return 16-bit weights that sum to 65535 exactly, as glTF requires (largest remainders)."""
+    # Rounding down leaves ``missing`` units, fewer than there are weights: one for each of the
+    # weights with the largest remainders, which ``rank`` counts from 0.
     exact = weights / weights.sum(axis=1, keepdims=True) * _WORD
     stored = np.floor(exact).astype(np.int64)
     missing = _WORD - stored.sum(axis=1)
@@ -400,6 +404,8 @@ def _summing(weights: Floats) -> NDArray[np.uint16]:
 
 def quantized(document: Document, positions: Floats, offsets: list[Floats]) -> Encoding:
     """Return an encoding whose range contains positions (V, 3) and their offsets (V, 3)."""
+    # Positions and offsets share one scale, because the node's matrix multiplies both. It is the
+    # same for all axes, so that normals need no transform.
     low, high = positions.min(axis=0), positions.max(axis=0)
     most = max((float(np.abs(each).max(initial=0.0)) for each in offsets), default=0.0)
     reach = max(0.5 * float((high - low).max()), most)

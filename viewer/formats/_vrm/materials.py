@@ -112,6 +112,7 @@ def upgraded_binds(told: object, materials: list[Any]) -> tuple[dict[str, list[A
             move = moves.setdefault(owner, _main_transform(materials[owner]))
             for axis in _AXES[name]:
                 scale, offset = float(value[axis]), float(value[2 + axis])
+                # With v' = 1 - v, v scale + offset becomes v' scale + (1 - offset - scale).
                 move[[axis, 2 + axis]] = scale, 1.0 - offset - scale if axis else offset
     moved = [
         {"material": owner, "scale": move[:2].tolist(), "offset": move[2:].tolist()}

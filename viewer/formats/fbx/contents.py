@@ -453,6 +453,8 @@ def _crossings(table: Floats, targets: list[float]) -> Floats:
     times, weights = table.T
     found = [np.zeros(0)]
     for stop in {0.0, *targets} if len(targets) > 1 or min(targets) < 0.0 else ():
+        # Between two keys the weight is linear, so it passes the stop at the fraction a / (a - b)
+        # of their interval, where a and b are the distances of the keys' weights from it.
         above, below = weights[:-1] - stop, weights[1:] - stop
         passed = above * below < 0.0
         fractions = above[passed] / (above[passed] - below[passed])

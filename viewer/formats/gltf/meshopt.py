@@ -443,6 +443,9 @@ def _octahedral(rows: NDArray[np.signedinteger]) -> Bytes:
 
 def _quaternions(rows: NDArray[np.signedinteger]) -> Bytes:
     """Return quaternions whose largest component is not stored."""
+    # The fourth number has the index of the largest component in its two lowest bits; with these
+    # set, it is the value of 1. No other component exceeds sqrt(1/2), which is the scale, and the
+    # largest follows from the unit length; a quaternion and its negative are the same rotation.
     one = (rows[:, 3] | 3).astype(np.float64)
     small = rows[:, :3] / one[:, None] * np.sqrt(0.5)
     large = np.sqrt(np.maximum(0.0, 1.0 - np.einsum("nc,nc->n", small, small)))
@@ -469,6 +472,8 @@ def _colors(rows: NDArray[np.unsignedinteger]) -> Bytes:
     bits = np.frexp(np.maximum(alpha, 1).astype(np.float64))[1]
     most = (1 << bits) - 1
     own = alpha & most >> 1
+    # YCoCg: red = Y + Co - Cg, green = Y + Cg, blue = Y - Co - Cg. Alpha has one bit less than the
+    # colours, so its lowest bit is repeated.
     channels = [luma + orange - green, luma + green, luma - orange - green, own << 1 | own & 1]
     scaled = np.stack(channels, axis=1) * (np.iinfo(rows.dtype).max / most)[:, None]
     return _stored(scaled, rows)
