@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, TypeGuard
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.file_record import Json
 
 
 def part(told: object, *names: str) -> Any:
@@ -21,6 +23,11 @@ def list_in(told: object, *names: str) -> list[Any]:
     """Return a nested list; an empty one if it is missing or not a list."""
     found = part(told, *names)
     return found if isinstance(found, list) else []
+
+
+def objects_in(told: object, *names: str) -> Iterator[tuple[int, Json]]:
+    """Yield the objects in a nested list, with their indices."""
+    return ((at, each) for at, each in enumerate(list_in(told, *names)) if isinstance(each, dict))
 
 
 def is_index(value: object, count: int) -> TypeGuard[int]:

@@ -15,7 +15,7 @@ import numpy as np
 from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree
-from viewer.formats._vrm.parts import list_in, part
+from viewer.formats._vrm.parts import list_in, objects_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.phrases import agree, counted, listed, rounded
@@ -306,17 +306,9 @@ def _check_rotations(document: Document, sampler: Element) -> None:
         )
 
 
-def _items_of(told: object, name: str) -> Iterator[tuple[int, Json]]:
-    """Yield the objects in a list that is a member of an object, with their indices."""
-    found = told.get(name) if isinstance(told, dict) else None
-    for index, item in enumerate(found if isinstance(found, list) else ()):
-        if isinstance(item, dict):
-            yield index, item
-
-
 def _check_storage(root: Json, report: _Report) -> None:
     """Check all accessors and buffer views."""
-    for index, accessor in _items_of(root, "accessors"):
+    for index, accessor in objects_in(root, "accessors"):
         path, kind = ("accessors", index), accessor.get("componentType")
         if accessor.get("normalized") is True and kind in _UNNORMALIZED:
             wanted = "integers of 8 or 16 bits"
@@ -330,7 +322,7 @@ def _check_storage(root: Json, report: _Report) -> None:
             elif isinstance(bounds, list) and any(abs(each) > _LARGEST for each in bounds):
                 found = max(bounds, key=abs)
                 report(wording.STORAGE, "numbers in single precision", found, (*path, name))
-    for index, view in _items_of(root, "bufferViews"):
+    for index, view in objects_in(root, "bufferViews"):
         _check_view(root, view, index, report)
     _check_uses(root, report)
 
@@ -362,7 +354,7 @@ def _check_view(root: Json, view: Json, index: int, report: _Report) -> None:
 
 def _check_uses(root: Json, report: _Report) -> None:
     """Check that each view has one kind of content, and the target and stride of that kind."""
-    accessors, views = dict(_items_of(root, "accessors")), dict(_items_of(root, "bufferViews"))
+    accessors, views = dict(objects_in(root, "accessors")), dict(objects_in(root, "bufferViews"))
     first: dict[int, str] = {}
     told: set[tuple[int, str]] = set()
     for accessor, kind, path in _uses(root):
@@ -386,19 +378,19 @@ def _check_uses(root: Json, report: _Report) -> None:
 def _uses(root: Json) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
     """Yield the accessors that are used, the kind of content, and the path to the reference."""
     given: list[tuple[Any, str, tuple[str | int, ...]]] = []
-    for m, mesh in _items_of(root, "meshes"):
-        for p, primitive in _items_of(mesh, "primitives"):
+    for m, mesh in objects_in(root, "meshes"):
+        for p, primitive in objects_in(mesh, "primitives"):
             path: tuple[str | int, ...] = ("meshes", m, "primitives", p)
             given.append((primitive.get("indices"), "indices", (*path, "indices")))
-            morphs = [(("targets", t), target) for t, target in _items_of(primitive, "targets")]
+            morphs = [(("targets", t), target) for t, target in objects_in(primitive, "targets")]
             for at, attributes in [(("attributes",), primitive.get("attributes")), *morphs]:
                 for name, used in attributes.items() if isinstance(attributes, dict) else ():
                     given.append((used, "vertex attributes", (*path, *at, name)))
-    for s, skin in _items_of(root, "skins"):
+    for s, skin in objects_in(root, "skins"):
         used = skin.get("inverseBindMatrices")
         given.append((used, "inverse bind matrices", ("skins", s, "inverseBindMatrices")))
-    for a, animation in _items_of(root, "animations"):
-        for s, sampler in _items_of(animation, "samplers"):
+    for a, animation in objects_in(root, "animations"):
+        for s, sampler in objects_in(animation, "samplers"):
             for name in ("input", "output"):
                 path = ("animations", a, "samplers", s, name)
                 given.append((sampler.get(name), "keys of animations", path))
@@ -410,11 +402,11 @@ def _uses(root: Json) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
 def _check_primitives(document: Document, report: _Report) -> None:
     """Check the attributes of all primitives."""
     root = document.root.values
-    accessors, materials = dict(_items_of(root, "accessors")), dict(_items_of(root, "materials"))
+    accessors, materials = dict(objects_in(root, "accessors")), dict(objects_in(root, "materials"))
     used = root.get("extensionsUsed")
     quantized = isinstance(used, list) and "KHR_mesh_quantization" in used
-    for m, mesh in _items_of(root, "meshes"):
-        for p, primitive in _items_of(mesh, "primitives"):
+    for m, mesh in objects_in(root, "meshes"):
+        for p, primitive in objects_in(mesh, "primitives"):
             path: tuple[str | int, ...] = ("meshes", m, "primitives", p)
             attributes = primitive.get("attributes")
             given = attributes if isinstance(attributes, dict) else {}
@@ -465,7 +457,7 @@ def _check_targets(
 ) -> None:
     if primitive.get("targets") == []:
         report(wording.STORAGE, "at least one morph target", "none", (*path, "targets"))
-    for t, target in _items_of(primitive, "targets"):
+    for t, target in objects_in(primitive, "targets"):
         for name, index in target.items():
             at = (*path, "targets", t, name)
             if not _MORPHED.fullmatch(name):
@@ -539,10 +531,10 @@ def _check_structure(
     for name in _LISTS:
         if root.get(name) == []:
             report(wording.STRUCTURE, "at least one item", "none", (name,))
-    for index, node in _items_of(root, "nodes"):
+    for index, node in objects_in(root, "nodes"):
         _check_node(node, index, report)
     _check_skinned(root, tree, skins, report)
-    for index, scene in _items_of(root, "scenes"):
+    for index, scene in objects_in(root, "scenes"):
         seen: set[int] = set()
         for place, root_node in enumerate(list_in(scene, "nodes")):
             if isinstance(root_node, int) and root_node in seen:
@@ -550,8 +542,8 @@ def _check_structure(
                 report(wording.G003_STRUCTURE, "each node once", f"node {root_node} again", at)
             elif isinstance(root_node, int):
                 seen.add(root_node)
-    nodes = dict(_items_of(root, "nodes"))
-    for index, animation in _items_of(root, "animations"):
+    nodes = dict(objects_in(root, "nodes"))
+    for index, animation in objects_in(root, "animations"):
         for name in ("channels", "samplers"):
             if animation.get(name) == []:
                 report(
@@ -560,7 +552,7 @@ def _check_structure(
                     "none",
                     ("animations", index, name),
                 )
-        for place, channel in _items_of(animation, "channels"):
+        for place, channel in objects_in(animation, "channels"):
             moved, node = part(channel, "target", "path"), part(channel, "target", "node")
             owner = nodes.get(node, {}) if isinstance(node, int) else {}
             if "skin" in owner and moved in ("translation", "rotation", "scale"):
@@ -603,7 +595,7 @@ def _check_skinned(
     parents, tops = tree.parents.tolist(), roots_of(tree.parents)
     scenes = [
         {node for node in list_in(scene, "nodes") if isinstance(node, int)}
-        for _, scene in _items_of(root, "scenes")
+        for _, scene in objects_in(root, "scenes")
     ]
     for node in np.flatnonzero(tree.skins >= 0).tolist():
         if parents[node] >= 0:

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.formats._scene_graph.content import NodeTree
+from viewer.formats._vrm.parts import objects_in
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
 from viewer.phrases import agree, counted, listed
@@ -146,7 +147,7 @@ def unkept_members(root: Json) -> tuple[str, ...]:
         if kind == "asset":
             found |= dict.fromkeys(_members(kind, [told], False))
         elif isinstance(told, list):
-            found |= dict.fromkeys(_names_not_kept(kind, told, root))
+            found |= dict.fromkeys(_names_not_kept(kind, root))
             found |= dict.fromkeys(_members(kind, told, kind in _KEPT))
     return tuple(found)
 
@@ -167,12 +168,12 @@ def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
                 yield from _members(name, value if isinstance(value, list) else [value], False)
 
 
-def _names_not_kept(kind: str, listed: list[Any], root: Json) -> Iterator[str]:
+def _names_not_kept(kind: str, root: Json) -> Iterator[str]:
     """Yield the name of a list whose items lose names."""
-    named = {at: item["name"] for at, item in enumerate(_objects(listed)) if item.get("name")}
+    named = {at: item["name"] for at, item in objects_in(root, kind) if item.get("name")}
     if kind == "cameras":
         # The node's name comes first; without one, the camera keeps its own.
-        nodes = [node for node in _objects(root.get("nodes")) if node.get("name")]
+        nodes = [node for _, node in objects_in(root, "nodes") if node.get("name")]
         lost = any(
             named.get(node.get("camera", -1), node["name"]) != node["name"] for node in nodes
         )
@@ -191,8 +192,8 @@ def _extensions(kind: str, told: object) -> Iterator[str]:
 def contents_of(root: Json) -> tuple[Phrase, ...]:
     """Return what a document holds, with numbers, as parts of a message."""
     counts: Counter[str] = Counter()
-    for mesh in _objects(root.get("meshes")):
-        for primitive in _objects(mesh.get("primitives")):
+    for _, mesh in objects_in(root, "meshes"):
+        for _, primitive in objects_in(mesh, "primitives"):
             counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
     parts = [
         ("{n} of points", "primitive", counts["points"]),
@@ -200,13 +201,7 @@ def contents_of(root: Json) -> tuple[Phrase, ...]:
         ("{n} of triangles that no node shows", "primitive", counts["triangles"]),
     ]
     for kind in ("camera", "node", "skin", "animation", "material", "image"):
-        parts.append(("{n}", kind, len(_objects(root.get(f"{kind}s")))))
-    extensions = root.get("extensions")
-    told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
-    if isinstance(told, dict):
-        parts.append(("{n}", "light", len(_objects(told.get("lights")))))
+        parts.append(("{n}", kind, len([*objects_in(root, f"{kind}s")])))
+    lights = [*objects_in(root, "extensions", "KHR_lights_punctual", "lights")]
+    parts.append(("{n}", "light", len(lights)))
     return tuple(Phrase(text, n=counted(n, noun)) for text, noun, n in parts if n)
-
-
-def _objects(listed: object) -> list[Json]:
-    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeTree, Primitive
+from viewer.formats._vrm.parts import list_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.draco import decoded_primitive
 from viewer.formats.gltf.elements import Element, Table
@@ -510,28 +511,17 @@ def _offsets(attributes: _Attributes, targets: Table, name: str) -> MorphTargets
 
 def _target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
     """Return the names of the morph targets, stated in any of three places; empty without names."""
-    candidates = [_named(mesh)]
+    candidates = [list_in(mesh.values, "extras", "targetNames")]
     for place in range(len(primitives)):
         targets = primitives[place].table("targets")
         candidates += [
-            _named(primitives[place]),
-            [_extra(item, "name") for item in targets.items],
+            list_in(primitives[place].values, "extras", "targetNames"),
+            [part(item, "extras", "name") for item in targets.items],
         ]
     for names in candidates:
         if len(names) == count and any(type(name) is str and name for name in names):
             return tuple(name if type(name) is str else "" for name in names)
     return ("",) * count
-
-
-def _named(element: Element) -> list[Any]:
-    names = _extra(element.values, "targetNames")
-    return names if type(names) is list else []
-
-
-def _extra(values: object, name: str) -> Any:
-    """Return a member of an object's application data; None if it is missing."""
-    extras = values.get("extras") if type(values) is dict else None
-    return extras.get(name) if type(extras) is dict else None
 
 
 def _default_weights(mesh: Element, count: int) -> Floats:
