@@ -255,11 +255,11 @@ def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     # At this point the program is waiting for a reader of the pipe, or is about to wait.
     program = (
         "import os, sys, threading, viewer.media.saving as save, viewer.cli\n"
-        "write = save._write_through\n"
-        "def waiting(*given):\n"
+        "write = save.save_parts\n"
+        "def waiting(*given, **named):\n"
         "    threading.Timer(0.5, os.kill, [os.getpid(), 15]).start()\n"
-        "    write(*given)\n"
-        "save._write_through = waiting\n"
+        "    write(*given, **named)\n"
+        "save.save_parts = waiting\n"
         "sys.exit(viewer.cli.run(sys.argv[1:]))\n"
     )
     done = subprocess.run(

@@ -1,5 +1,7 @@
 """Options made from fields of a settings class, and settings made from options."""
 
+from __future__ import annotations  # as in all of viewer: the types of fields are read as text
+
 import pytest
 
 from viewer.commands._settings import add_settings, settings_of, stated

@@ -165,7 +165,7 @@ for level in range(17):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_disk_fill_level_results_in_one_message_or_a_video(tiny_disk, suffix):
     """The test runs in a separate process, because FFmpeg could crash with a segmentation fault."""
-    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
+    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
     run = subprocess.run(
         [sys.executable, "-c", _LEVELS, str(tiny_disk), suffix],
         env={**os.environ, "PYTHONPATH": folders},
