@@ -12,8 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import (
     SHORTEST,
     Channel,
@@ -33,28 +32,19 @@ _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
 _UNCHANGED = 1e-9  # tolerance, in radians or lengths, within which a DOF equals its curve
 
 
-def add_key(
-    channel: Channel,
-    time: float,
-    value: float | None = None,
-    tangents: tuple[Tangent, Tangent] | None = None,
-) -> tuple[Channel, int]:
+def add_key(channel: Channel, time: float, value: float | None = None) -> tuple[Channel, int]:
     """Return a channel with a key at a time, changing one that is there, and its index.
 
-    Without value and tangents, a key between others keeps the curve: it and neighbours whose rules
-    look at adjacent keys get their slopes there as numbers. Otherwise tangents are smooth.
+    Without a value, a key between others keeps the curve: it and neighbours whose rules look at
+    adjacent keys get their slopes there as numbers. Otherwise its tangents are smooth.
     """
     there = np.flatnonzero(np.abs(channel.times - time) <= SHORTEST)
     if len(there):
         key = int(there[0])
-        changed = channel if value is None else set_key(channel, key, value=value)
-        if tangents is not None:
-            changed = set_tangent(set_tangent(changed, key, 0, tangents[0]), key, 1, tangents[1])
-        return changed, key
+        return channel if value is None else set_key(channel, key, value=value), key
     key = int(np.searchsorted(channel.times, time))
-    pairs = list(channel.tangents)
-    is_between = 0 < key < len(channel.times)
-    if value is None and tangents is None and is_between:
+    pairs, tangents = list(channel.tangents), _SMOOTH
+    if value is None and 0 < key < len(channel.times):
         slope = slope_at(channel, time)
         tangents = (slope, slope)
         for neighbour in (key - 1, key):
@@ -65,7 +55,7 @@ def add_key(
         channel,
         times=np.insert(channel.times, key, time),
         values=np.insert(channel.values, key, value),
-        tangents=(*pairs[:key], tangents or _SMOOTH, *pairs[key:]),
+        tangents=(*pairs[:key], tangents, *pairs[key:]),
     )
     return added, key
 
@@ -219,17 +209,11 @@ def key_pose(
     )
 
 
-def clip_from_frames(
-    name: str, dofs: Floats, times: Floats, rule: Tangent = "linear", present: Bools | None = None
-) -> Clip:
-    """Return a clip with a key per present frame from (F, D) DOFs; one if a DOF is constant."""
-    keep = np.ones(len(times), dtype=np.bool_) if present is None else present
-    if not keep.any():
-        raise RigError(f"clip {name}: expected at least one frame, found none")
+def clip_from_frames(name: str, dofs: Floats, times: Floats, rule: Tangent = "linear") -> Clip:
+    """Return a clip with a key per frame from (F, D) DOFs, F > 0; one key if a DOF is constant."""
     times, dofs = np.asarray(times, dtype=np.float64), np.asarray(dofs, dtype=np.float64)
-    span, times, dofs = times[[0, -1]].tolist(), times[keep], dofs[keep]
     channels = tuple(_from_frames(dof, times, column, rule) for dof, column in enumerate(dofs.T))
-    return Clip(name, channels, *span)
+    return Clip(name, channels, *times[[0, -1]].tolist())
 
 
 def _from_frames(dof: int, times: Floats, values: Floats, rule: Tangent) -> Channel:
