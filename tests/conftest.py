@@ -1,5 +1,6 @@
 """Fixtures and paths shared by test files."""
 
+import functools
 import gc
 import itertools
 import os
@@ -117,6 +118,15 @@ def own_settings(settings_folder: str) -> None:
     folder = f"{settings_folder}/{next(_NUMBERS)}"
     for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
         os.environ[name] = f"{folder}/{name}"
+
+
+@pytest.fixture(scope="module")
+def family(tmp_path_factory):
+    """Figures of the SMPL family by kind, each read once."""
+    from builders import family_figure
+
+    folder = tmp_path_factory.mktemp("family")
+    return functools.cache(lambda kind: family_figure(kind, folder))
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import faults
 import numpy as np
+from builders import quaternions
 from exporting import export_frames
 from plain_bvh import PlainBvh
 
@@ -19,12 +20,6 @@ from viewer.rig.skeleton import Skeleton, ball_skeleton
 
 TENTH = 1e-5  # in metres, 0.01 mm
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
-
-
-def quaternions(vectors: np.ndarray) -> np.ndarray:
-    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    axes = vectors / np.where(angles > 0, angles, 1.0)
-    return np.concatenate([axes * np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
 
 
 def body_animation(

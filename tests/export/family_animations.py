@@ -1,7 +1,8 @@
 """Animations of synthetic SMPL-family bodies, and explicit formulas for their vertices."""
 
 import numpy as np
-from plain_smpl import rotation, smpl_forward
+from builders import rotation
+from plain_smpl import smpl_forward
 
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure

@@ -7,6 +7,8 @@ import math
 import re
 from pathlib import Path
 
+from builders import axis_turn
+
 
 class PlainBvh:
     """Names, parents, offsets, channels and frames as written in a file."""
@@ -82,7 +84,7 @@ class PlainBvh:
                 if channel.endswith("position"):
                     offset[axis] = value
                 else:
-                    turn = product(turn, about(axis, math.radians(value)))
+                    turn = product(turn, axis_turn(axis, math.radians(value)).tolist())
             if parent < 0:
                 matrices.append(turn)
                 places.append(offset)
@@ -92,16 +94,6 @@ class PlainBvh:
                 moved = [a * offset[0] + b * offset[1] + c * offset[2] for a, b, c in above]
                 places.append([a + b for a, b in zip(places[parent], moved, strict=True)])
         return dict(zip(self.names, zip(matrices, places, strict=True), strict=True))
-
-
-def about(axis: int, angle: float) -> list[list[float]]:
-    """Return the textbook rotation about one axis."""
-    c, s = math.cos(angle), math.sin(angle)
-    return [
-        [[1, 0, 0], [0, c, -s], [0, s, c]],
-        [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-        [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-    ][axis]
 
 
 def product(a: list[list[float]], b: list[list[float]]) -> list[list[float]]:

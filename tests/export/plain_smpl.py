@@ -1,18 +1,7 @@
 """The forward pass of the SMPL family as in its paper, with explicit loops (Loper et al. 2015)."""
 
-import math
-
 import numpy as np
-
-
-def rotation(vector: np.ndarray) -> np.ndarray:
-    """Return the exponential of the cross-product matrix by Rodrigues' formula."""
-    angle = math.sqrt(sum(n * n for n in vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = np.asarray(vector) / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
+from builders import rotation
 
 
 def smpl_forward(

@@ -3,7 +3,7 @@
 import faults
 import numpy as np
 import pytest
-from export.plain_smpl import rotation
+from builders import rotation
 from exporting import export_frames
 from family_animations import (
     clip_animation,
@@ -13,7 +13,6 @@ from family_animations import (
     vertices_about_pelvis,
     waves,
 )
-from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -29,19 +28,6 @@ from viewer.rig.motion.timing import Timing
 ATOL = 1e-13
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}
 GAPS = np.array([-1, 0, 1, -1, -1, 2, 3])  # frames 0, 3 and 4 are missing
-
-
-@pytest.fixture(scope="module")
-def family(tmp_path_factory):
-    """Figures of the family by kind, each read once."""
-    folder, figures = tmp_path_factory.mktemp("family"), {}
-
-    def get(kind):
-        if kind not in figures:
-            figures[kind] = family_figure(kind, folder)
-        return figures[kind]
-
-    return get
 
 
 def written(animation, path, **options):

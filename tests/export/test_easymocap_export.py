@@ -6,10 +6,9 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
-from export.plain_smpl import rotation
+from builders import rotation
 from exporting import export_frames, export_people
 from family_animations import family_animation, family_motion, vertices_about_origin, waves
-from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
@@ -21,19 +20,6 @@ from viewer.rig.motion.sampled_clip import joined
 
 ATOL = 1e-6  # in metres and radians, for seven decimals summed along an arm
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55, "mano": 16}
-
-
-@pytest.fixture(scope="module")
-def family(tmp_path_factory):
-    """Figures of the family by kind, each read once."""
-    folder, figures = tmp_path_factory.mktemp("family"), {}
-
-    def get(kind):
-        if kind not in figures:
-            figures[kind] = family_figure(kind, folder)
-        return figures[kind]
-
-    return get
 
 
 def frames_in(folder):

@@ -7,21 +7,20 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
+from builders import axis_turn, family_figure, quaternions
 from export.bvh_animations import (
     TO_Y,
     assert_places,
     body_animation,
     chain,
     joints_of,
-    quaternions,
     rig_animation,
     write,
 )
 from exporting import export_frames
-from family_models import family_figure
 from hypothesis import given
 from hypothesis import strategies as st
-from plain_bvh import PlainBvh, about
+from plain_bvh import PlainBvh
 
 import viewer
 from viewer.errors import OutputError, RigError
@@ -516,7 +515,7 @@ def test_end_sites_of_the_bundled_body_are_on_its_skin(tmp_path):
 def angle_product(order: str, angles: np.ndarray) -> np.ndarray:
     result = np.eye(3)
     for axis, angle in zip(order, angles, strict=True):
-        result = result @ np.array(about("xyz".index(axis), float(angle)))
+        result = result @ axis_turn("xyz".index(axis), float(angle))
     return result
 
 

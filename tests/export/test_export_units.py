@@ -6,12 +6,12 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
+from builders import rotation
 from exporting import export_frames
 from formats.bvh_text import PERSON_JOINTS, PERSON_TURNED, person
 from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
-from plain_smpl import rotation
 from seamed import POSITIONS, seamed_actor
 
 import viewer

@@ -6,7 +6,7 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from formats.synthetic_smpl import model
 from gltf_files import EXACT, TO_Y, assert_drawn, assert_joints, corners, write
 from numpy.testing import assert_allclose, assert_array_equal

@@ -6,9 +6,9 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
+from builders import family_figure, quaternions
 from exporting import export_frames
 from family_animations import family_animation, family_motion, waves
-from family_models import family_figure
 from gltf_files import AS_IS, EXACT, TO_Y, assert_drawn, corners
 from numpy.testing import assert_allclose, assert_array_equal
 from plain_gltf import Gltf
@@ -31,12 +31,6 @@ from viewer.rig.skinning import Skinning, deform
 
 LIMIT = "not stored in glTF"
 ROOM = 3e-5  # in metres, for keys in single precision accumulated along the longest chain of a body
-
-
-def quaternions(vectors) -> np.ndarray:
-    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    axes = vectors / np.where(angles > 0, angles, 1.0)
-    return np.concatenate([axes * np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
 
 
 def roof_animation(rows=None, count=4, rate=10.0, **tracks) -> SampledAnimation:

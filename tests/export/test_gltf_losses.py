@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from family_models import family_figure
+from builders import family_figure
 from formats.pig_text import write as write_pig
 from gltf_files import EXACT, TO_Y, assert_drawn, corners, write
 from numpy.testing import assert_allclose

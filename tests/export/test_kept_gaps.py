@@ -5,10 +5,10 @@ import json
 import faults
 import numpy as np
 import pytest
+from builders import family_figure, quaternions
 from export.plain_readers import read_obj
 from exporting import export_frames
 from family_animations import family_animation, family_motion
-from family_models import family_figure
 from formats.gltf.files import File, skinned
 from numpy.testing import assert_allclose, assert_array_equal
 from seamed import POSITIONS, seamed_actor
@@ -113,16 +113,11 @@ def test_interpolated_frames_of_folders_are_written(tmp_path):
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     export_frames(animation, tmp_path / "out", "easymocap", ExportOptions(gaps="interpolate"))
     (person,) = json.loads((tmp_path / "out" / "smpl" / "000006.json").read_text())
-    ends = [quaternion(motion.vectors[row, 4]) for row in (0, 2)]
+    ends = [quaternions(motion.vectors[row, 4]) for row in (0, 2)]
     ends[1] = ends[1] if ends[0] @ ends[1] > 0 else -ends[1]
     middle = (ends[0] + ends[1]) / np.linalg.norm(ends[0] + ends[1])
-    found = quaternion(np.array(person["poses"][0][12:15]))
+    found = quaternions(np.array(person["poses"][0][12:15]))
     assert_allclose(abs(found @ middle), 1.0, atol=1e-9)
-
-
-def quaternion(vector):
-    angle = np.linalg.norm(vector)
-    return np.append(np.sin(angle / 2) * vector / angle, np.cos(angle / 2))
 
 
 @pytest.mark.parametrize("key", ["obj", "npz", "easymocap"])

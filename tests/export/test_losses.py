@@ -6,9 +6,9 @@ from pathlib import Path
 import faults
 import numpy as np
 import pytest
+from builders import family_figure
 from exporting import export_frames
 from family_animations import family_animation, family_motion, waves
-from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh

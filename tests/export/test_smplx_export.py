@@ -5,10 +5,9 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
-from export.plain_smpl import rotation
+from builders import family_figure, rotation
 from exporting import export_frames
 from family_animations import family_animation, family_motion, vertices_about_pelvis, waves
-from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from builders import family_figure
 from exporting import export_frames
-from family_models import family_figure
 from gltf_files import assert_drawn
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf

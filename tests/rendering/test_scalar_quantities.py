@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from rendering.drawn_figures import arm, bent, scene_of, skeleton, square
 from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
 

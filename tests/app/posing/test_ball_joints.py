@@ -4,28 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from builders import axis_turn, rotation
 from formats.pig_text import write as write_pig
 from numpy.testing import assert_allclose
 
 from viewer.app.posing.posing import Posing
 
 
-def rodrigues(vector):
-    """Return I + sin K + (1 - cos) K^2 with K the cross product with the axis."""
-    angle = math.sqrt(sum(part * part for part in vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = (part / angle for part in vector)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-
-
 def euler(x, y, z):
-    """Return Rz Ry Rx."""
-    turn_x = [[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]]
-    turn_y = [[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]]
-    turn_z = [[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]]
-    return np.array(turn_z) @ np.array(turn_y) @ np.array(turn_x)
+    return axis_turn(2, z) @ axis_turn(1, y) @ axis_turn(0, x)
 
 
 def _rotation(hand, joint):
@@ -62,7 +49,7 @@ def test_typed_vector_rotates_the_joint_by_rodrigues_formula(vectors):
     for degrees in TURNS:
         vectors.key("r")
         _enter_vector(vectors, "joint_1", *degrees)
-        assert_allclose(_rotation(vectors, "joint_1"), rodrigues(np.radians(degrees)), atol=1e-12)
+        assert_allclose(_rotation(vectors, "joint_1"), rotation(np.radians(degrees)), atol=1e-12)
         assert not vectors.dofs()[[*range(3), *range(6, 9)]].any()
 
 
@@ -71,7 +58,7 @@ def test_dragged_component_rotates_about_its_axis(vectors):
         vectors.drag(f"joint_1.r{'xyz'[axis]}", 0.75)
         vector = np.zeros(3)
         vector[axis] = math.pi / 2
-        assert_allclose(_rotation(vectors, "joint_1"), rodrigues(vector), atol=0.06)
+        assert_allclose(_rotation(vectors, "joint_1"), rotation(vector), atol=0.06)
         assert vectors.undo_steps == 1
         vectors.key("z", "ctrl")
         assert not vectors.dofs().any()
@@ -83,13 +70,13 @@ def test_drag_passes_180_degrees_without_a_jump(vectors):
     y = (y0 + y1) / 2
     vectors.move(((x0 + x1) / 2, y))
     vectors.press()
-    lengths, before = [], rodrigues((math.radians(150), 0, 0))
+    lengths, before = [], rotation((math.radians(150), 0, 0))
     for share in np.linspace(0.5, 1.0, 25):
         vectors.move((x0 + share * (x1 - x0), y))
         vectors.step()
         vector, found = vectors.state.of(Posing).held_vector.vector, _rotation(vectors, "joint_1")
         assert vector[0] == pytest.approx(math.radians(150), abs=1e-12) and vector[2] == 0
-        assert_allclose(found, rodrigues(vector), atol=1e-12)
+        assert_allclose(found, rotation(vector), atol=1e-12)
         assert np.abs(found - before).max() < 0.3
         lengths.append(np.linalg.norm(vector))
         before = found
@@ -106,14 +93,14 @@ def test_shown_vector_is_discarded_when_another_pose_is_restored(vectors, key):
     vectors.step(2)
     assert vectors.state.of(Posing).held_vector is None
     vectors.enter_value("joint_1.ry", "30")
-    wanted = rodrigues((0, math.radians(30), 0))
+    wanted = rotation((0, math.radians(30), 0))
     assert_allclose(_rotation(vectors, "joint_1"), wanted, atol=1e-12)
 
 
 def test_double_click_sets_a_component_to_0(vectors):
     _enter_vector(vectors, "joint_1", 20, 40, 0)
     vectors.double_click(vectors.place("joint_1.rx", 0.3))
-    assert_allclose(_rotation(vectors, "joint_1"), rodrigues((0, math.radians(40), 0)), atol=1e-12)
+    assert_allclose(_rotation(vectors, "joint_1"), rotation((0, math.radians(40), 0)), atol=1e-12)
 
 
 def test_vectors_are_typed_in_the_chosen_unit(vectors):
@@ -156,7 +143,7 @@ def test_raw_pose_values_of_an_euler_root_are_z_y_x_angles(drive, tmp_path, text
     first, second = _own(hand, texts)[:2]
     assert first == "file: 0.5236  0.3491  0.1745"
     numbers = [float(word) for word in second.split()[1:]]
-    assert_allclose(rodrigues(numbers), euler(*np.radians([10, 20, 30])), atol=2e-4)
+    assert_allclose(rotation(numbers), euler(*np.radians([10, 20, 30])), atol=2e-4)
 
 
 def test_rigs_without_a_pose_layout_have_angles_only(hand, texts):
@@ -227,7 +214,7 @@ def test_m_key_mirrors_the_pose(vectors):
     vectors.key("m")
     # Mirrored across x, a rotation vector keeps its x and negates its y and z.
     for joint, degrees in (("0", (10, -20, -30)), ("1", (-70, 0, -5)), ("2", (40, 50, -60))):
-        wanted = rodrigues(np.radians(degrees))
+        wanted = rotation(np.radians(degrees))
         assert_allclose(_rotation(vectors, f"joint_{joint}"), wanted, atol=1e-12)
     assert vectors.state.actor.pose.figure_translation.tolist() == [-0.5, 0, 0]
     assert vectors.undo_steps == steps + 1 and vectors.says("Pose mirrored")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from app.captured import NAMES, dots
-from family_models import family_figure
+from builders import family_figure
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 

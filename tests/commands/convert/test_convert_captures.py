@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from builders import rotation
 from export.plain_bvh import PlainBvh
 from export.plain_readers import read_obj
-from export.plain_smpl import rotation
 from export.small_rigs import ARMS_SKEL, clip_text, write_box, write_twist
 from formats.capture_files import body, points, standing, write_frames
 from formats.synthetic_smpl import model

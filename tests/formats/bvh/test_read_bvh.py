@@ -1,9 +1,11 @@
 """The BVH reader: all rotation orders, positions on any joint, quirks, and estimates."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
+from builders import axis_turn
 from formats.bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,15 +21,7 @@ from viewer.rig.motion.timing import Timing
 
 
 def about(axis: int, degrees: float) -> np.ndarray:
-    """Return the textbook matrix of a rotation about one axis."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array(
-        [
-            [[1, 0, 0], [0, c, -s], [0, s, c]],
-            [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-            [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-        ][axis]
-    )
+    return axis_turn(axis, math.radians(degrees))
 
 
 def worlds(motion: SkeletonMotion) -> np.ndarray:

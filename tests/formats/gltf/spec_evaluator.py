@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from builders import quaternion_matrix
 
 FORMATS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -127,15 +128,10 @@ class Evaluator:
         if "matrix" in node:
             return np.array(node["matrix"], self.precision).reshape(4, 4).T
         quaternion = np.array(node.get("rotation", (0, 0, 0, 1)), self.precision)
-        x, y, z, w = quaternion / np.linalg.norm(quaternion)
-        turn = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+        turn = quaternion_matrix(quaternion / np.linalg.norm(quaternion))
         whole = np.eye(4, dtype=self.precision)
         scale = np.array(node.get("scale", (1, 1, 1)), self.precision)
-        whole[:3, :3] = np.array(turn, self.precision) * scale
+        whole[:3, :3] = turn * scale
         whole[:3, 3] = node.get("translation", (0, 0, 0))
         return whole
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from builders import quaternion_matrix
 
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeSkin, NodeTree, Primitive
 from viewer.formats._source import Source
@@ -81,24 +82,12 @@ def source() -> Source:
     return Source("hero.glb", data=b"")
 
 
-def rotation(quaternion: np.ndarray) -> np.ndarray:
-    """Return the matrix of a unit quaternion (x, y, z, w)."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def local(tree: NodeTree, node: int, turn: np.ndarray | None = None) -> np.ndarray:
     """Return the local matrix T R S of a node, with an additional rotation before S."""
     if node in tree.matrices:
         return tree.matrices[node]
     matrix = np.eye(4)
-    turned = rotation(tree.rotations[node]) @ (np.eye(3) if turn is None else turn)
+    turned = quaternion_matrix(tree.rotations[node]) @ (np.eye(3) if turn is None else turn)
     matrix[:3, :3] = turned @ np.diag(tree.scales[node])
     matrix[:3, 3] = tree.translations[node]
     return matrix

@@ -1,6 +1,7 @@
 """A tiny SKEL model with the published keys, and a written-out forward pass for one pose."""
 
 import numpy as np
+from builders import rotation
 
 PARENTS = (-1, 0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 12, 14, 15, 16, 17, 12, 19, 20, 21, 22)
 N_VERTICES, N_SHAPES, N_JOINTS = 40, 4, 24
@@ -33,7 +34,7 @@ def arrays(seed=8):
     regressor = generator.random((N_JOINTS, N_VERTICES))
     frames = np.tile(np.eye(4), (N_JOINTS, 1, 1))
     for joint in range(N_JOINTS):
-        frames[joint, :3, :3] = turned(generator.normal(size=3))
+        frames[joint, :3, :3] = rotation(generator.normal(size=3))
         frames[joint, :3, 3] = generator.normal(size=3)
     kintree = np.stack([np.array(PARENTS) % 2**32, np.arange(N_JOINTS)])
     return {
@@ -46,24 +47,15 @@ def arrays(seed=8):
         "J_regressor_osim": regressor / regressor.sum(axis=1, keepdims=True),
         "osim_kintree_table": kintree,
         "apose_rel_transfo": frames,
-        "per_joint_rot": np.stack([turned(generator.normal(size=3)) for _ in range(N_JOINTS)]),
+        "per_joint_rot": np.stack([rotation(generator.normal(size=3)) for _ in range(N_JOINTS)]),
     }
-
-
-def turned(vector):
-    angle = np.linalg.norm(vector)
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = np.asarray(vector) / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
 def axes_of(joint):
     """Return the axes of a joint's DOFs."""
     if joint in PINS:
         x, y, z = PINS[joint]
-        frame = turned([x, 0, 0]) @ turned([0, y, 0]) @ turned([0, 0, z])
+        frame = rotation([x, 0, 0]) @ rotation([0, y, 0]) @ rotation([0, 0, z])
         return [frame @ [0, 0, 1]]
     if joint in OTHER:
         return [np.array(OTHER[joint])]
@@ -76,7 +68,7 @@ def aligning(source, target):
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis = np.cross(a, b)
     angle = np.arctan2(np.linalg.norm(axis), a @ b)
-    return turned(angle * axis / np.linalg.norm(axis))
+    return rotation(angle * axis / np.linalg.norm(axis))
 
 
 def bone_frames(model, joints, steps):
@@ -129,7 +121,7 @@ def forward(model, q, betas, place):
     for joint, bone in enumerate(bone_frames(model, joints, steps)):
         own = np.eye(3)
         for axis in axes_of(joint):
-            own = turned(q[start] * axis) @ own
+            own = rotation(q[start] * axis) @ own
             start += 1
         frame = bone @ model["apose_rel_transfo"][joint, :3, :3].T
         rotations.append(frame @ own @ frame.T)
@@ -143,8 +135,8 @@ def forward(model, q, betas, place):
         length = abs(joints[joint, 1] - joints[below, 1])
         steps[joint] += arc(q[first], q[first + 1], length) - arc(0, 0, length)
     feature = np.zeros((24, 3, 3))
-    for target, rotation in zip(SMPL, rotations, strict=True):
-        feature[target] = rotation - np.eye(3)
+    for target, turn in zip(SMPL, rotations, strict=True):
+        feature[target] = turn - np.eye(3)
     posed = shaped + model["posedirs"] @ feature[1:].ravel()
     worlds, places = [], []
     for joint, parent in enumerate(PARENTS):

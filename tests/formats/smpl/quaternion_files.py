@@ -1,6 +1,7 @@
 """Tiny STAR, SUPR and SMAL models with the published keys, and their forward passes."""
 
 import numpy as np
+from builders import rotation
 
 SMPL_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
 SMAL_PARENTS = (
@@ -46,16 +47,6 @@ def smal(seed=6):
     return star(SMAL_PARENTS, seed) | {"posedirs": directions}
 
 
-def turned(vector):
-    """Return the rotation by a vector, by Rodrigues' formula."""
-    angle = np.linalg.norm(vector)
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-
-
 def quaternion(vector):
     """Return the quaternion of a rotation vector as (x, y, z, w - 1)."""
     angle = np.linalg.norm(vector)
@@ -74,7 +65,7 @@ def forward(arrays, vectors, betas, place):
         feature = np.concatenate([quaternion(vector) for vector in vectors])
     elif arrays["posedirs"].shape[2] == 9 * (len(vectors) - 1):
         joints = regressor @ shaped
-        feature = np.concatenate([(turned(vector) - np.eye(3)).ravel() for vector in vectors[1:]])
+        feature = np.concatenate([(rotation(vector) - np.eye(3)).ravel() for vector in vectors[1:]])
     else:
         joints = regressor @ shaped
         feature = np.append(np.concatenate([quaternion(v) for v in vectors[1:]]), betas[1])
@@ -83,13 +74,13 @@ def forward(arrays, vectors, betas, place):
     for joint, vector in enumerate(vectors):
         above = parents[joint]
         if above < 0:
-            rotations.append(turned(vector))
+            rotations.append(rotation(vector))
             places.append(joints[joint])
             continue
-        rotations.append(rotations[above] @ turned(vector))
+        rotations.append(rotations[above] @ rotation(vector))
         places.append(places[above] + rotations[above] @ (joints[joint] - joints[above]))
     found = np.zeros_like(posed)
-    for joint, (rotation, at) in enumerate(zip(rotations, places, strict=True)):
-        moved = (posed - joints[joint]) @ rotation.T + at
+    for joint, (turn, at) in enumerate(zip(rotations, places, strict=True)):
+        moved = (posed - joints[joint]) @ turn.T + at
         found += arrays["weights"][:, joint, None] * moved
     return found + place, np.array(places) + place

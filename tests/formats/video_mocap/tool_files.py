@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from export.plain_smpl import rotation, smpl_forward
+from builders import rotation
+from export.plain_smpl import smpl_forward
 from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
 from formats.synthetic_smpl import joint_parents, model

@@ -3,7 +3,7 @@
 import moderngl
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from formats.mhr.mhr_files import write as write_mhr
 from formats.skel_body.skel_files import arrays as skel
 from formats.smpl.quaternion_files import star, supr

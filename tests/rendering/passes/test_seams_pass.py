@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from rendering.drawn_figures import random_pose, skeleton
 
 import viewer

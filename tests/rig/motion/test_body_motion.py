@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from export.plain_smpl import rotation, smpl_forward
-from family_models import family_figure
+from builders import rotation
+from export.plain_smpl import smpl_forward
 from faults import told
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
@@ -24,19 +24,6 @@ TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])
 def waves(*shape, seed=0.0):
     count = int(np.prod(shape))
     return 0.5 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3).reshape(shape)
-
-
-@pytest.fixture(scope="module")
-def family(tmp_path_factory):
-    """Figures of the family by kind, each read once."""
-    folder, figures = tmp_path_factory.mktemp("family"), {}
-
-    def get(kind: str) -> Figure:
-        if kind not in figures:
-            figures[kind] = family_figure(kind, folder)
-        return figures[kind]
-
-    return get
 
 
 def motion(names, vectors, **words):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from numpy.testing import assert_allclose
 from rig.hand_made import skeleton as course_skeleton
 

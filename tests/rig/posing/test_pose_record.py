@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from family_models import family_figure
+from builders import family_figure
 from faults import told
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
@@ -14,19 +14,6 @@ from viewer.rig.pose import Pose, joint_rotations, pose_key, rest_pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
 from viewer.rig.posing.pose_vector import own_numbers
 from viewer.rig.scene import figure_pose
-
-
-@pytest.fixture(scope="module")
-def family(tmp_path_factory):
-    """Figures of the family by kind, each read once."""
-    folder, figures = tmp_path_factory.mktemp("family"), {}
-
-    def get(kind: str) -> Figure:
-        if kind not in figures:
-            figures[kind] = family_figure(kind, folder)
-        return figures[kind]
-
-    return get
 
 
 def vectors(figure: Figure, pose: Pose) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import axis_turn, quaternion_matrix
 from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, NAMES, forward, write
 from lint.sound import make_skeleton
 from numpy.testing import assert_allclose
@@ -227,18 +228,6 @@ def test_layout_refuses_parts_that_do_not_fit(parts, message):
 FREE = (-np.inf, np.inf)
 
 
-def about_axis(axis: int, angle: float) -> np.ndarray:
-    """Return the rotation about a coordinate axis, written out."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array(
-        [
-            [[1, 0, 0], [0, c, -s], [0, s, c]],
-            [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-            [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-        ][axis]
-    )
-
-
 def single(axes: str, *limits: tuple[float, float], quaternion=(0, 0, 0, 1)) -> Skeleton:
     """Return one joint that rotates about some axes, the first letter applied first."""
     bounds = np.array([*limits, *([FREE] * (len(axes) - len(limits)))], float).reshape(-1, 2)
@@ -263,14 +252,7 @@ def test_rotation_about_three_axes_in_any_order_is_exact(order):
         random = np.random.default_rng(seed)
         q = random.standard_normal(4)
         q /= np.linalg.norm(q)
-        x, y, z, w = q
-        wanted = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        wanted = quaternion_matrix(q)
         found = nearest_dofs(skeleton, pose, 0, wanted)
         pose.dofs[:] = found.dofs
         assert_allclose(joint_rotations(skeleton, pose)[0], wanted, atol=1e-12)
@@ -280,7 +262,7 @@ def test_rotation_about_three_axes_in_any_order_is_exact(order):
 def test_axes_are_applied_in_the_order_of_the_rows():
     # Rows z, x, y: z is applied first, so R = Ry Rx Rz.
     angles = np.array([0.3, -0.4, 1.1])
-    wanted = about_axis(1, 1.1) @ about_axis(0, -0.4) @ about_axis(2, 0.3)
+    wanted = axis_turn(1, 1.1) @ axis_turn(0, -0.4) @ axis_turn(2, 0.3)
     skeleton = single("zxy")
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, wanted)
     assert_allclose(found.dofs, angles, atol=1e-12)
@@ -291,7 +273,7 @@ def test_solution_nearer_the_current_values_is_chosen():
     pose = rest_pose(skeleton)
     # With y beyond a right angle, the rotation equals that of (x + pi, pi - y, z + pi).
     pose.dofs[:] = 0.1, 2.0, 0.2
-    wanted = about_axis(2, 0.25) @ about_axis(1, 2.1) @ about_axis(0, 0.05)
+    wanted = axis_turn(2, 0.25) @ axis_turn(1, 2.1) @ axis_turn(0, 0.05)
     assert_allclose(nearest_dofs(skeleton, pose, 0, wanted).dofs, [0.05, 2.1, 0.25], atol=1e-9)
     # Multiples of 360 degrees are preserved too.
     pose.dofs[:] = 0.1 + 4 * np.pi, 2.0, 0.2
@@ -302,20 +284,20 @@ def test_solution_nearer_the_current_values_is_chosen():
 def test_limits_select_the_allowed_solution():
     # Only y between 1.6 and 2.5 is allowed; the principal solution has y below pi / 2.
     skeleton = single("xyz", FREE, (1.6, 2.5), FREE)
-    wanted = about_axis(2, 0.4) @ about_axis(1, 2.2) @ about_axis(0, -0.3)
+    wanted = axis_turn(2, 0.4) @ axis_turn(1, 2.2) @ axis_turn(0, -0.3)
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, wanted)
     assert_allclose(found.dofs, [-0.3, 2.2, 0.4], atol=1e-9)
 
 
 def test_solution_360_degrees_away_within_the_limits_is_found():
     skeleton = single("x", (2 * np.pi + 0.1, 2 * np.pi + 1.0))
-    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(0, 0.5))
+    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, axis_turn(0, 0.5))
     assert_allclose(found.dofs, [2 * np.pi + 0.5], atol=1e-12)
 
 
 def test_rotation_beyond_a_limit_is_replaced_by_the_nearest_and_its_dof_named():
     skeleton = single("xyz", (-0.5, 0.5), (-0.5, 0.5), (-0.5, 0.5))
-    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(1, 0.8))
+    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, axis_turn(1, 0.8))
     assert_allclose(found.dofs, [0, 0.5, 0], atol=1e-9)
     assert found.limited.tolist() == [1]
     assert found.error == pytest.approx(0.3)
@@ -327,14 +309,14 @@ def test_no_rotation_within_the_limits_is_nearer():
     grids = [np.linspace(low, high, 15) for low, high in limits]
     for seed in range(6):
         a, b, c = np.random.default_rng(seed).uniform(-1.2, 1.2, 3)
-        wanted = about_axis(2, c) @ about_axis(1, b) @ about_axis(0, a)
+        wanted = axis_turn(2, c) @ axis_turn(1, b) @ axis_turn(0, a)
         found = nearest_dofs(skeleton, rest_pose(skeleton), 0, wanted)
         best = max(
-            np.trace(wanted.T @ about_axis(2, z) @ about_axis(1, y) @ about_axis(0, x))
+            np.trace(wanted.T @ axis_turn(2, z) @ axis_turn(1, y) @ axis_turn(0, x))
             for x, y, z in itertools.product(*grids)
         )
         x, y, z = found.dofs
-        ours = np.trace(wanted.T @ about_axis(2, z) @ about_axis(1, y) @ about_axis(0, x))
+        ours = np.trace(wanted.T @ axis_turn(2, z) @ axis_turn(1, y) @ axis_turn(0, x))
         assert ours >= best - 1e-9
         assert (found.dofs >= skeleton.dof_limits[:, 0]).all()
         assert (found.dofs <= skeleton.dof_limits[:, 1]).all()
@@ -343,9 +325,9 @@ def test_no_rotation_within_the_limits_is_nearer():
 def test_single_axis_takes_the_twist_about_it():
     skeleton = single("y")
     # For Ry(0.7) Rx(0.2), a single axis y is rotated by 0.7, because the trace is symmetric in x.
-    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(1, 0.7) @ about_axis(0, 0.2))
+    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, axis_turn(1, 0.7) @ axis_turn(0, 0.2))
     t = np.linspace(-np.pi, np.pi, 100_001)
-    wanted = about_axis(1, 0.7) @ about_axis(0, 0.2)
+    wanted = axis_turn(1, 0.7) @ axis_turn(0, 0.2)
     traces = (
         wanted[1, 1]
         + (wanted[0, 0] + wanted[2, 2]) * np.cos(t)
@@ -357,14 +339,14 @@ def test_single_axis_takes_the_twist_about_it():
 
 def test_joint_without_rotations_is_unchanged():
     skeleton = single("")
-    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(2, 0.5))
+    found = nearest_dofs(skeleton, rest_pose(skeleton), 0, axis_turn(2, 0.5))
     assert found.dofs.shape == (0,) and found.error == pytest.approx(0.5)
 
 
 def test_start_is_not_modified():
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
-    nearest_dofs(skeleton, pose, 0, about_axis(2, 0.5))
+    nearest_dofs(skeleton, pose, 0, axis_turn(2, 0.5))
     assert not pose.dofs.any()
 
 

@@ -4,8 +4,11 @@ The source's limbs are computed here, by multiplying matrices down its hierarchy
 other proportions and an A-pose.
 """
 
+import math
+
 import numpy as np
 import pytest
+from builders import axis_turn
 from numpy.testing import assert_allclose
 
 from viewer.formats import Source, bvh
@@ -105,12 +108,7 @@ def names_of(scheme: str) -> list[str]:
 
 
 def about(axis: int, degrees: float) -> np.ndarray:
-    """Return the rotation about one axis."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    result = np.eye(3)
-    result[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
-    return result
+    return axis_turn(axis, math.radians(degrees))
 
 
 AXES = {"y": np.eye(3), "z": about(0, 90), "x": about(2, -90)}  # y becomes the axis

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import axis_turn
 from faults import told
 from numpy.testing import assert_allclose
 from rig.retargeting.two_people import BODY, figure_of
@@ -25,17 +26,6 @@ from viewer.rig.retargeting.pose_transfer import (
 from viewer.rig.skeleton import Skeleton
 
 HALF = np.sqrt(0.5)
-
-
-def about(axis: int, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array(
-        [
-            [[1, 0, 0], [0, c, -s], [0, s, c]],
-            [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-            [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-        ][axis]
-    )
 
 
 def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=None) -> Figure:
@@ -76,11 +66,11 @@ def test_different_order_of_dofs_gets_the_same_rotation():
     angles = 0.3, -0.5, 0.8, 1.0, 0.2, -0.7
     pose, notes = transfer_pose(one, posed(one, *angles), other, rest_pose(other.skeleton))
     z, x, y = pose.dofs[:3]
-    first = about(2, 0.8) @ about(1, -0.5) @ about(0, 0.3)
-    assert_allclose(about(1, y) @ about(0, x) @ about(2, z), first, atol=1e-12)
+    first = axis_turn(2, 0.8) @ axis_turn(1, -0.5) @ axis_turn(0, 0.3)
+    assert_allclose(axis_turn(1, y) @ axis_turn(0, x) @ axis_turn(2, z), first, atol=1e-12)
     y, z, x = pose.dofs[3:]
-    second = about(2, -0.7) @ about(1, 0.2) @ about(0, 1.0)
-    assert_allclose(about(0, x) @ about(2, z) @ about(1, y), second, atol=1e-12)
+    second = axis_turn(2, -0.7) @ axis_turn(1, 0.2) @ axis_turn(0, 1.0)
+    assert_allclose(axis_turn(0, x) @ axis_turn(2, z) @ axis_turn(1, y), second, atol=1e-12)
     assert told(notes) == [("F007.joints-taken-over", {"n": 2, "all": 2, "figure": "one"})]
 
 
@@ -259,7 +249,7 @@ def test_edited_dofs_override_the_stored_rotations():
     assert found.rotations.tolist() == [[0, 0, 0, 1], [HALF, 0, 0, HALF]]
     assert not found.translations.any()
     # Relative to the parent the rotation is Rx(90) Rx(0.25), so the edit has its full effect.
-    turned = about(0, np.pi / 2 + 0.25)
+    turned = axis_turn(0, np.pi / 2 + 0.25)
     assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
 
 
@@ -271,7 +261,7 @@ def test_edited_dofs_keep_rotations_below_the_dofs():
     record = record_of(one, pose)
     found = rest_pose(one.skeleton)
     assert apply_record(replace(record, dofs={**record.dofs, "b.x": -0.5}), one, found) == []
-    wanted = about(1, 0.7) @ about(0, -0.5)
+    wanted = axis_turn(1, 0.7) @ axis_turn(0, -0.5)
     assert_allclose(joint_rotations(one.skeleton, found)[1], wanted, atol=1e-12)
     assert found.translations.tolist() == [[0, 0, 0], [0.5, 0.25, -1.0]]
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import quaternion_matrix, quaternions
 from faults import told
 from rig.retargeting.two_people import (
     BODY,
@@ -13,7 +14,6 @@ from rig.retargeting.two_people import (
     figure_of,
     moving,
     places,
-    quaternions,
 )
 
 from viewer.diagnostics import Diagnostic
@@ -150,24 +150,13 @@ def test_result_does_not_depend_on_the_joint_axes_of_the_figure():
     for joint, parent in enumerate(skeleton.parents):
         above = np.eye(3) if parent < 0 else worlds[parent]
         offsets.append(above.T @ skeleton.rest_translations[joint])
-        worlds.append(above @ matrix(turns[joint]))
+        worlds.append(above @ quaternion_matrix(turns[joint]))
     turned = replace(skeleton, rest_rotations=turns, rest_translations=np.array(offsets))
     figure = replace(plain, skeleton=turned)
     expected = places(plain, retarget(source, plain).clip)
     found = places(figure, retarget(source, figure).clip)
     for name, place in expected.items():
         np.testing.assert_allclose(found[name], place, atol=1e-12)
-
-
-def matrix(quaternion: np.ndarray) -> np.ndarray:
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)

@@ -1,6 +1,7 @@
 """Two people with different joint names, poses and proportions, and their limb directions."""
 
 import numpy as np
+from builders import quaternions
 
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
@@ -80,12 +81,6 @@ def moving(figure: Figure, count: int = 5, seed: int = 0, angle: float = 2.0) ->
     shifts[1:, 0] = rng.uniform(-size, size, (count - 1, 3))
     clip = SampledClip("walk", Timing(30.0, np.arange(count)), quaternions(vectors), shifts)
     return SkeletonMotion(figure, clip)
-
-
-def quaternions(vectors: np.ndarray) -> np.ndarray:
-    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    axes = vectors / np.where(angles > 0, angles, 1.0)
-    return np.concatenate([axes * np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
 
 
 def places(figure: Figure, clip: SampledClip) -> dict[str, np.ndarray]:
