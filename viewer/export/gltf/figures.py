@@ -79,7 +79,18 @@ def add_figure(
     pose = actor.pose if clips is None else still_pose(actor)
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
     if clips is not None:
-        weights = _shape_rows(clips, _shown_weights(figure, weights[0]))
+        # The weights at rest, by the rules of expressions and 0 where missing, and a row that is
+        # not 0 where an animation sets a weight.
+        rest = np.zeros(figure.n_shapes)
+        rest[: weights.shape[1]] = weights[0]
+        shapes = figure.blend_shapes
+        if shapes is not None and shapes.rules is not None:
+            rest = shapes.rules.shown(rest)
+        weights = np.stack([rest, rest])
+        keyed = (each.shapes for clip in clips for each in clip.channels)
+        for moved in keyed:
+            if moved is not None:
+                weights[1, moved] = 1.0
     shape = shape_of(figure, weights)
     body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
     skeleton, still = body.figure.skeleton, None
@@ -193,35 +204,15 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
     return notes
 
 
-def _shown_weights(figure: Figure, weights: Floats) -> Floats:
-    """Return the displayed weights, (S,), by the rules of expressions; missing ones are 0."""
-    whole = np.zeros(figure.n_shapes)
-    whole[: len(weights)] = weights
-    shapes = figure.blend_shapes
-    return whole if shapes is None or shapes.rules is None else shapes.rules.shown(whole)
-
-
-def _shape_rows(clips: Sequence[TransformClip], weights: Floats) -> Floats:
-    """Return the weights at rest and a row with non-zero animated weights: (2, S)."""
-    rows = np.stack([weights, weights])
-    for clip in clips:
-        for channel in clip.channels:
-            if channel.shapes is not None:
-                rows[1, channel.shapes] = 1.0
-    return rows
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """The rest pose and all animations at some times, of the figure and of the file.
-
-    ``clips``, ``times`` (F,): animation of each row, -1 for the rest pose, and its time in seconds.
-    """
+    """The rest pose and all animations at some times, of the figure and of the file."""
 
     frames: Frames
     keys: Keys
     clips: Floats
     times: Floats
+    """Animation of each row, -1 for the rest pose, and its time in seconds: (F,)."""
 
 
 def _clip_losses(

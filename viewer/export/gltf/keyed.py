@@ -129,14 +129,11 @@ class _Keys:
             values = values.ravel()
         mode = "linear" if channel.tangents is not None and not is_cubic else channel.interpolation
         output = self._document.array(values, kind)
-        self.parts.add(node, channel.path, self._input(channel.times), output, _MODES[mode])
-
-    def _input(self, times: Floats) -> int:
-        single = _increasing(times - self._first)
+        single = _increasing(channel.times - self._first)
         key = single.tobytes()
         if key not in self._times:
             self._times[key] = self._document.array(single, "SCALAR", bounds=True)
-        return self._times[key]
+        self.parts.add(node, channel.path, self._times[key], output, _MODES[mode])
 
 
 def _increasing(times: Floats) -> NDArray[np.float32]:
