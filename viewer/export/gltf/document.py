@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import struct
-from typing import Any
+from typing import Any, Literal, TypeAlias
 from urllib.parse import quote
 
 import numpy as np
@@ -25,7 +25,9 @@ _TYPES = {
     np.dtype("<u4"): 5125,
     np.dtype("<f4"): 5126,
 }
-_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+Kind: TypeAlias = Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT4"]
+"""Type of the elements of an accessor."""
+_SIZES: dict[Kind, int] = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _PADDING = 4  # alignment of arrays, bytes: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
 _HEADER = 28  # bytes of a .glb in addition to JSON and arrays
@@ -58,13 +60,13 @@ class Document:
         known += [name for name in extensions if name not in known]
 
     def array(
-        self, values: NDArray[np.number], kind: str, target: int = 0, bounds: bool = False
+        self, values: NDArray[np.number], kind: Kind, target: int = 0, bounds: bool = False
     ) -> int:
         """Add values (N, ...), N > 0, of which floats become float32; return the accessor."""
         return self.arrays(values[None], kind, target, bounds)[0]
 
     def arrays(
-        self, values: NDArray[np.number], kind: str, target: int = 0, bounds: bool = False
+        self, values: NDArray[np.number], kind: Kind, target: int = 0, bounds: bool = False
     ) -> list[int]:
         """Add arrays (A, N, ...) as ``array`` does, equal ones once; return their accessors."""
         stored = self._stored(values)
@@ -90,7 +92,7 @@ class Document:
         self._arrays[known] = accessors
         return list(accessors)
 
-    def integers(self, values: NDArray[np.integer], kind: str, bounds: bool = False) -> int:
+    def integers(self, values: NDArray[np.integer], kind: Kind, bounds: bool = False) -> int:
         """Add normalised integers (N, C), padded to rows of 4 bytes; return the accessor."""
         stored = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
         size = stored.itemsize * stored.shape[1]

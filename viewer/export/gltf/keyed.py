@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export.gltf.document import Document, named, text_of
+from viewer.export.gltf.document import Document, Kind, named, text_of
 from viewer.export.gltf.mesh import Placed
 from viewer.export.gltf.nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -20,14 +20,21 @@ from viewer.rig.motion.transform_clip import (
     Interpolation,
     TransformChannel,
     TransformClip,
+    TransformPath,
     sample_transforms,
 )
 from viewer.rig.skeleton import Skeleton
 
+_Mode: TypeAlias = Literal["LINEAR", "STEP", "CUBICSPLINE"]
 _Targets: TypeAlias = NDArray[np.integer]
 """Indices of blend shapes."""
-_MODES = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
-_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+_MODES: dict[Interpolation, _Mode] = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
+_KINDS: dict[TransformPath, Kind] = {
+    "translation": "VEC3",
+    "rotation": "VEC4",
+    "scale": "VEC3",
+    "weights": "SCALAR",
+}
 _RATE = 60.0  # frames per second at which channels of different interpolation are merged
 _NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
@@ -39,7 +46,7 @@ class AnimationParts:
         self.samplers: list[Json] = []
         self.channels: list[Json] = []
 
-    def add(self, node: int, path: str, times: int, output: int, mode: str = "LINEAR") -> None:
+    def add(self, node: int, path: str, times: int, output: int, mode: _Mode = "LINEAR") -> None:
         """Add the keys of a property of a node: accessors of times in seconds, and of values."""
         target = {"node": node, "path": path}
         self.channels.append({"sampler": len(self.samplers), "target": target})
