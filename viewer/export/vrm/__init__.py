@@ -1,8 +1,9 @@
-"""Exporter for VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
+"""Exporter for VRM 1.0 characters: a ``.glb`` with human bones, meta data and more.
 
-A figure from a VRM file keeps its version and all data of its extensions, unless VRM 0.x is to
-become 1.0. Any other figure with the required human bones becomes VRM 1.0: at rest in a T-pose, in
-metres, facing +z. Specification: ``github.com/vrm-c/vrm-specification``.
+A figure from a VRM file keeps all data of its extensions, which the reader upgrades if they are of
+version 0.x; such a figure is turned to face +z. Any other figure with the required human bones is
+written at rest in a T-pose, in metres, facing +z. Specification:
+``github.com/vrm-c/vrm-specification``.
 """
 
 from __future__ import annotations
