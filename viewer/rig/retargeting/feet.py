@@ -155,46 +155,40 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
     def text(length: float) -> str:
         return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
 
-    values = {
+    notes: list[Diagnostic] = []
+
+    def note(key: str, **values: object) -> None:
+        notes.append(Diagnostic(key, values=values))
+
+    note(
+        "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after} "
+        "instead of {before} ({source} in {motion}); {remedy} disables this",
         **called,
-        "n": counted(changes.n_contacts, "contact"),
-        "source": text(changes.source),
-        "before": text(changes.before),
-        "after": text(changes.after),
-        "remedy": Remedy("Feet on the ground in the Actors panel", "--feet off"),
-    }
-    notes = [
-        Diagnostic(
-            "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after} "
-            "instead of {before} ({source} in {motion}); {remedy} disables this",
-            values=values,
-        )
-    ]
-    own = {"figure": figure.name}
-    gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
-    notes.append(
-        Diagnostic(
-            "F007.feet-gap: soles of {figure} are at most {gap} from the ground during "
-            "contacts, instead of {gap_before}",
-            values=gaps,
-        )
+        n=counted(changes.n_contacts, "contact"),
+        source=text(changes.source),
+        before=text(changes.before),
+        after=text(changes.after),
+        remedy=Remedy("Feet on the ground in the Actors panel", "--feet off"),
+    )
+    note(
+        "F007.feet-gap: soles of {figure} are at most {gap} from the ground during "
+        "contacts, instead of {gap_before}",
+        figure=figure.name,
+        gap_before=text(changes.gap_before),
+        gap=text(changes.gap_after),
     )
     if changes.lowered > _ROUNDING * changes.size:
-        length = text(changes.lowered)
-        notes.append(
-            Diagnostic(
-                "F007.feet-lowered: {figure} is lowered by up to {length}, so that its feet reach "
-                "the ground",
-                values=own | {"length": length},
-            )
+        note(
+            "F007.feet-lowered: {figure} is lowered by up to {length}, so that its feet reach "
+            "the ground",
+            figure=figure.name,
+            length=text(changes.lowered),
         )
     if changes.ground_speed:
-        speed = f"{text(changes.ground_speed)}/s"
-        notes.append(
-            Diagnostic(
-                "F007.feet-ground: ground moves at {speed}, as on a treadmill: planted feet of "
-                "{figure} move with it",
-                values=own | {"speed": speed},
-            )
+        note(
+            "F007.feet-ground: ground moves at {speed}, as on a treadmill: planted feet of "
+            "{figure} move with it",
+            figure=figure.name,
+            speed=f"{text(changes.ground_speed)}/s",
         )
     return notes

@@ -453,46 +453,39 @@ def _limbs_at_rest(
                 unmatched.append(mine[places[name]])
             elif name not in places and name in meanings and has_limb:
                 unknown.append(name.replace("_", " "))
-    found = []
+    found, remedy = list[Diagnostic](), Remedy("", " or with --joint-map")
+
+    def warn(key: str, **values: object) -> None:
+        found.append(Diagnostic(key, values=values))
+
     if unmatched:
         used = set(matches.partners.tolist())
         # Joints without a meaning are the likely ones.
         unused = [name for j, name in enumerate(theirs) if j not in used and not meanings[j]]
-        values = {
+        warn(
+            "C018.limbs-unmatched: {names} of {figure} {stay} at rest: nothing in {motion} is "
+            "recognised as {these} (unused: {unused}); match {them} in the Joint match "
+            "panel{remedy}",
             **called,
-            "n": len(unmatched),
-            "names": listed(unmatched),
-            "unused": listed(unused),
-            "stay": agree(len(unmatched), "stays", "stay"),
-            "these": agree(len(unmatched), "this joint", "these joints"),
-            "them": agree(len(unmatched), "it", "them"),
-            "remedy": Remedy("", " or with --joint-map"),
-        }
-        found.append(
-            Diagnostic(
-                "C018.limbs-unmatched: {names} of {figure} {stay} at rest: nothing in {motion} is "
-                "recognised as {these} (unused: {unused}); match {them} in the Joint match "
-                "panel{remedy}",
-                values=values,
-            )
+            n=len(unmatched),
+            names=listed(unmatched),
+            unused=listed(unused),
+            stay=agree(len(unmatched), "stays", "stay"),
+            these=agree(len(unmatched), "this joint", "these joints"),
+            them=agree(len(unmatched), "it", "them"),
+            remedy=remedy,
         )
     if unknown:
         idle = [mine[j] for j in np.flatnonzero(matches.partners < 0) if not matches.names[j]]
-        values = {
+        warn(
+            "C018.limbs-unknown: no joint of {figure} is recognised as {parts}: {motion} "
+            "cannot move {them} (at rest: {idle}); match {them} in the Joint match panel{remedy}",
             **called,
-            "n": len(unknown),
-            "parts": one_of(unknown),
-            "idle": listed(idle),
-            "them": agree(len(unknown), "it", "them"),
-            "remedy": Remedy("", " or with --joint-map"),
-        }
-        found.append(
-            Diagnostic(
-                "C018.limbs-unknown: no joint of {figure} is recognised as {parts}: {motion} "
-                "cannot move {them} (at rest: {idle}); match {them} in the Joint match "
-                "panel{remedy}",
-                values=values,
-            )
+            n=len(unknown),
+            parts=one_of(unknown),
+            idle=listed(idle),
+            them=agree(len(unknown), "it", "them"),
+            remedy=remedy,
         )
     is_still, is_moving = _extent(rotations)
     for upper, lower, _ in _LIMBS:
@@ -500,20 +493,14 @@ def _limbs_at_rest(
         if min(joints) < 0 or (matches.partners[joints] < 0).any():
             continue
         if is_moving[joints[:2]].all() and is_still[joints[2:]].all():
-            values = {
+            warn(
+                "C018.limbs-still: {names} of {figure} never bend, because {partners} of "
+                "{motion} never do; if this is wrong, match other joints in the Joint match "
+                "panel{remedy}",
                 **called,
-                "names": listed([mine[joint] for joint in joints[2:]]),
-                "partners": listed([theirs[matches.partners[joint]] for joint in joints[2:]]),
-                "remedy": Remedy("", " or with --joint-map"),
-            }
-            found.append(
-                Diagnostic(
-                    "C018.limbs-still: {names} of {figure} never bend, because {partners} of "
-                    "{motion} "
-                    "never do; if this is wrong, match other joints in the Joint match "
-                    "panel{remedy}",
-                    values=values,
-                )
+                names=listed([mine[joint] for joint in joints[2:]]),
+                partners=listed([theirs[matches.partners[joint]] for joint in joints[2:]]),
+                remedy=remedy,
             )
     return found
 
