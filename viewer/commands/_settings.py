@@ -58,7 +58,9 @@ def add_settings(
             continue
         if isinstance(default, list):
             how.setdefault("action", "append")
-        parser = _TYPES.get(str(each.type).partition(" ")[0])
+        # The annotation is text if its module postpones the evaluation.
+        annotation = each.type.__name__ if isinstance(each.type, type) else str(each.type)
+        parser = _TYPES.get(annotation.partition(" ")[0])
         if parser is not None and not {"type", "choices", "action"} & {*how}:
             how["type"] = parser
         given = facts.get("given", None if default in ("", ()) else default)

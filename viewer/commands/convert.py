@@ -36,7 +36,7 @@ from viewer.commands._scene import (
 )
 from viewer.commands._settings import add_settings, number, settings_of, stated
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, OutputError, RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
@@ -155,8 +155,8 @@ def run(arguments: argparse.Namespace) -> int:
             else:
                 check_folder_target(files[0], inputs, arguments.force)
             notes = [*export(selection, output, options=options), *chosen, *baked]
-    for note in notes:
-        note_found(note)
+    for written in notes:
+        note_found(written)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 
@@ -372,7 +372,7 @@ def _selected(
         # Figures of one file share its animations.
         problems = dict.fromkeys(map(str, refused))
         key = "X003.invalid-animation: {problem}; this animation is not written"
-        notes = [Diagnostic(key, values={"problem": each}) for each in problems]
+        notes = [note(key, problem=each) for each in problems]
         return Selection(parts, scene), options, _left_out_notes(scene, actors) + notes
     if _is_motion(options.kind, frames, output, scene):
         kind = _exporter(options.kind, frames, output, scene)
@@ -493,11 +493,9 @@ def _pose_note(frames: Frames, scene: Scene) -> Diagnostic:
         return Diagnostic(wording.CURRENT_POSE)
     if frames.frame is not None:
         key = "X001.pose-at-frame: one frame: the pose at frame {frame}"
-        return Diagnostic(key, values={"frame": frames.frame})
+        return note(key, frame=frames.frame)
     if frames.time is not None:
-        return Diagnostic(
-            "X001.pose-at-time: one frame: the pose at {time:zg} s", values={"time": frames.time}
-        )
+        return note("X001.pose-at-time: one frame: the pose at {time:zg} s", time=frames.time)
     return Diagnostic(wording.CURRENT_POSE)
 
 
@@ -516,13 +514,13 @@ def _left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
         if moves
         else "X003.no-joints: {figure}: no joints, not written"
     )
-    notes = [Diagnostic(key, values={"figure": name}) for name in still]
+    notes = [note(key, figure=name) for name in still]
     if points:
         key = (
             "X003.keypoints: keypoints next to bodies are not written ({names}): to write them, "
             "open only the keypoints3d folder"
         )
-        notes.append(Diagnostic(key, values={"names": all_of(points)}))
+        notes.append(note(key, names=all_of(points)))
     return notes
 
 
@@ -567,14 +565,12 @@ def _bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) ->
             else wording.SPRINGS
         )
         notes.append(
-            Diagnostic(
+            note(
                 key,
-                values={
-                    "figure": actor.name,
-                    "n": counted(count, "spring joint"),
-                    "have": agree(count, "has", "have"),
-                    "remedy": Remedy("can write", "--bake-springs writes"),
-                },
+                figure=actor.name,
+                n=counted(count, "spring joint"),
+                have=agree(count, "has", "have"),
+                remedy=Remedy("can write", "--bake-springs writes"),
             )
         )
     return notes

@@ -25,7 +25,7 @@ from viewer.commands._progress import shown_progress
 from viewer.commands._scene import PICTURES, print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, described
+from viewer.diagnostics import Diagnostic, Phrase, described, note
 from viewer.diagnostics.record import is_recorded, note_values
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
@@ -198,10 +198,8 @@ def _compared(
         with shown_progress(f"comparing {Path(name).name}"):
             difference = compare(posed, second, skinning, n_poses, frames)
         if is_choice and first.figure.name != second.figure.name:
-            note = Diagnostic(
-                "D002.partner: compared with {name}", values={"name": brief(second.name)}
-            )
-            difference = replace(difference, notes=(note, *difference.notes))
+            paired_with = note("D002.partner: compared with {name}", name=brief(second.name))
+            difference = replace(difference, notes=(paired_with, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
     row = _Compared(name, differences, _lone(name, pairing), diagnostics=other.diagnostics)
@@ -212,7 +210,7 @@ def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
     """Return messages about actors and motions that are present in only one of the scenes."""
     sides = ((Phrase("the reference"), pairing.first), (name, pairing.second))
     return tuple(
-        Diagnostic("D001.actor: only in {side}: {actor}", values={"side": side, "actor": one})
+        note("D001.actor: only in {side}: {actor}", side=side, actor=one)
         for side, lone in sides
         for one in lone
     )

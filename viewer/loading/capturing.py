@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.loading.scaling import scale_to_unit
@@ -164,8 +164,7 @@ class Builder:
                 if self._has_parameters
                 else "F007.model-of-points: --model has no effect: the capture has only keypoints"
             )
-            values = {"member": self.capture.model}
-            return [Diagnostic(key, self.path, values=values)]
+            return [note(key, self.path, member=self.capture.model)]
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
@@ -283,18 +282,15 @@ class Builder:
         # Set when the actor was created.
         assert isinstance(actor.clip, PointClip) and known is not None
         if len(known.names) != len(layout.names):
-            values = {
-                "person": person_label(person),
-                "n": len(layout.names),
-                "frame": self.n_read + self.capture.first_frame,
-                "known": len(known.names),
-            }
             return [
-                Diagnostic(
+                note(
                     "C005.keypoint-count: {person} has {n} keypoints from frame {frame} onwards, "
                     "{known} before; those frames are omitted",
                     self.path,
-                    values=values,
+                    person=person_label(person),
+                    n=len(layout.names),
+                    frame=self.n_read + self.capture.first_frame,
+                    known=len(known.names),
                 )
             ]
         self._replace_clip(actor, _joined_points(actor.clip, clip))

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, frame_range
+from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import RigError
 from viewer.loading.settings import CleanUp
 from viewer.phrases import agree, counted, listed, optional, rounded
@@ -51,11 +51,10 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
         if not isinstance(clip, Captured):
             if clip is not None:
                 notes.append(
-                    Diagnostic(
+                    note(
                         "X006.keys: {figure}: its motion has keys instead of captured frames and "
-                        "is "
-                        "unchanged",
-                        values={"figure": actor.name},
+                        "is unchanged",
+                        figure=actor.name,
                     )
                 )
             continue
@@ -117,9 +116,9 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[
     figure = actor.figure
     if clip.points is not None or not legs_of(figure.require_skeleton()):
         return clip, [
-            Diagnostic(
+            note(
                 "X006.no-legs: {figure}: feet not held, because no joint has the name of a leg",
-                values={"figure": actor.name},
+                figure=actor.name,
             )
         ]
     axis, hangs = own_up(scene, actor)
@@ -131,9 +130,7 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[
             if lock.n_glides
             else "X006.no-contacts: {figure}: no foot is held, because none rests on the ground"
         )
-        return clip, [
-            Diagnostic(key, values={"figure": actor.name, "n": counted(lock.n_glides, "contact")})
-        ]
+        return clip, [note(key, figure=actor.name, n=counted(lock.n_glides, "contact"))]
     values: dict[str, object] = {
         "n": counted(lock.n_contacts, "contact"),
         "before": length_text(figure, lock.before),
@@ -145,20 +142,20 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[
     )
     notes = [_note(message, actor, values, clip, found)]
     if lock.lowered > _ROUNDING:
-        values = {"figure": actor.name, "length": length_text(figure, lock.lowered)}
         notes.append(
-            Diagnostic(
+            note(
                 "X006.locked-lowered: {figure}: lowered by up to {length}, so that its feet reach "
                 "the ground",
-                values=values,
+                figure=actor.name,
+                length=length_text(figure, lock.lowered),
             )
         )
     if lock.n_glides:
-        values = {"figure": actor.name, "n": counted(lock.n_glides, "more contact")}
         notes.append(
-            Diagnostic(
+            note(
                 "X006.locked-glides: {figure}: feet not held in {n}, in which they glide too far",
-                values=values,
+                figure=actor.name,
+                n=counted(lock.n_glides, "more contact"),
             )
         )
     return found, notes
@@ -168,10 +165,10 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
     """Return a motion whose feet rest at height 0 of the scene."""
     found = resting_height(replace(actor, clip=clip), scene.up)
     if found is None or clip.points is not None:
-        return clip, Diagnostic(
+        return clip, note(
             "X006.no-feet: {figure}: not moved to the ground, because it has neither feet with "
             "a mesh nor joints of known names",
-            values={"figure": actor.name},
+            figure=actor.name,
         )
     height, is_clear = found
     height = 0.0 if abs(height) < _ROUNDING else height
@@ -216,11 +213,9 @@ def _trimmed(
     timing = clip.timing
     found = trimmed(clip, *frames)
     number, count = found.timing.first_frame, found.timing.n_frames
+    key = "X006.trimmed: {figure}: frames {first} to {last} kept, {n} of {all}"
     values = {"first": number, "last": number + count - 1, "n": count, "all": timing.n_frames}
-    return found, Diagnostic(
-        "X006.trimmed: {figure}: frames {first} to {last} kept, {n} of {all}",
-        values={"figure": actor.name, **values},
-    )
+    return found, note(key, figure=actor.name, **values)
 
 
 def _interpolated(
@@ -240,10 +235,11 @@ def _interpolated(
             "seconds": rounded((stop - first) / timing.frame_rate, 2),
         }
         notes.append(
-            Diagnostic(
+            note(
                 "X006.gaps: {figure}: {n} in {gaps} interpolated; the longest is {longest} "
                 "({seconds} s)",
-                values={"figure": actor.name, **values},
+                figure=actor.name,
+                **values,
             )
         )
     if gaps.left:
@@ -256,13 +252,11 @@ def _interpolated(
             "gaps": listed(spans),
         }
         notes.append(
-            Diagnostic(
+            note(
                 "X006.gaps-left: {figure}: {n} longer than {limit} {remain}: {gaps}",
-                values={
-                    "figure": actor.name,
-                    **values,
-                    "remain": agree(len(gaps.left), "remains", "remain"),
-                },
+                figure=actor.name,
+                **values,
+                remain=agree(len(gaps.left), "remains", "remain"),
             )
         )
     return clip, notes
@@ -324,7 +318,7 @@ def _note(
         "where": optional(" ({})", where),
     }
     key += "{part} move by {mean} on average, by {largest} at most{where}"
-    return Diagnostic(key, values={"figure": actor.name, **values, **moved})
+    return note(key, figure=actor.name, **values, **moved)
 
 
 def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
@@ -355,9 +349,9 @@ def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
 
 def _renumbered(actor: Actor, person: int) -> Diagnostic:
     """Return a note about a body or keypoints that the first person did not have."""
-    part = Phrase("keypoints" if actor.moves_points else "body")
-    values = {"part": part, "other": person_label(actor.person or 0), "kept": person_label(person)}
-    return Diagnostic("X006.renumbered: {part} of {other} assigned to {kept}", values=values)
+    part, other = "keypoints" if actor.moves_points else "body", person_label(actor.person or 0)
+    key = "X006.renumbered: {part} of {other} assigned to {kept}"
+    return note(key, part=Phrase(part), other=other, kept=person_label(person))
 
 
 def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list[Diagnostic]:

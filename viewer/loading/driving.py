@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import RigError
 from viewer.formats._video_images import VideoImages
 from viewer.formats.easymocap.cameras import ImageFolders, find_images
@@ -389,15 +389,13 @@ def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
     if abs(video / rate - 1.0) <= _SAME_RATE:
         return []
     return [
-        Diagnostic(
+        note(
             "F007.video-rate: the video has {video} frames per second, the capture {rate}: "
             "they are matched by time ({remedy} sets the capture's rate)",
             path,
-            values={
-                "video": rounded(video, 6),
-                "rate": rounded(rate, 6),
-                "remedy": Remedy("Frames per second in the Timeline", "--fps"),
-            },
+            video=rounded(video, 6),
+            rate=rounded(rate, 6),
+            remedy=Remedy("Frames per second in the Timeline", "--fps"),
         )
     ]
 
@@ -427,11 +425,12 @@ def _assumed(size: tuple[int, int], path: Path) -> tuple[list[CameraView], list[
     intrinsic = np.array(
         [[focal, 0.0, size[0] / 2.0], [0.0, focal, size[1] / 2.0], [0.0, 0.0, 1.0]]
     )
-    values = {"focal": focal, "width": size[0], "height": size[1]}
-    note = Diagnostic(
+    assumed = note(
         "F007.assumed-camera: the files have no camera: a focal length of {focal:.0f} "
         "pixels, the diagonal of {width} x {height}, is assumed",
         path,
-        values=values,
+        focal=focal,
+        width=size[0],
+        height=size[1],
     )
-    return [CameraView(_CAMERA, intrinsic, np.eye(3), np.zeros(3), size)], [note]
+    return [CameraView(_CAMERA, intrinsic, np.eye(3), np.zeros(3), size)], [assumed]
