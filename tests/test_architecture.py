@@ -64,7 +64,7 @@ LEAVES = {
     "diagnostics": {"data_classes", "phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
-    "progress": set(),
+    "progress": {"interrupts"},
     "version": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {

@@ -9,8 +9,8 @@ while pure Python or numpy code runs::
         with deferred():       # OpenGL: recorded, raised at the end of the block
             draw()
         hold()                 # results are written: from now on only poll() raises
-        for file in files:
-            poll()             # between complete units of work
+        for done, file in enumerate(files):
+            report(done, len(files))  # polls between complete units of work
             write(file)
 
 A signal after the last ``poll`` is too late: the work is done, and the result is success. A second

@@ -2,7 +2,8 @@
 
 Slow functions call ``report`` between parts of their work that take a few milliseconds. Whoever
 shows the progress calls them within ``receiving``. The receiver cancels the work by raising
-``Cancelled`` when a report arrives; the work then cleans up as after any exception.
+``Cancelled`` when a report arrives, a deferred signal by raising ``Interrupted``; the work then
+cleans up as after any exception.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
+
+from viewer.interrupts import poll
 
 Receiver = Callable[[int, int, str, str], None]
 """Called with the completed steps, their total (0 if unknown), their unit, and a description of the
@@ -88,7 +91,9 @@ def part_of_work(title: str = "", span: tuple[float, float] | None = None) -> It
 
 
 def report(done: int, total: int, unit: str = "", what: str = "") -> None:
-    """Report the completed steps to the receiver, if there is one."""
+    """Report the completed steps to the receiver, if there is one; the work may end here."""
+    if not total or done < total:  # after the last step, the result may be complete
+        poll()
     part = _part.get()
     if part is not None:
         part.pass_on(done, total, unit, what)

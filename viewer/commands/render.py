@@ -48,7 +48,7 @@ from viewer.commands._view import (
 from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
-from viewer.interrupts import deferred, hold, poll
+from viewer.interrupts import deferred, hold
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
@@ -443,9 +443,8 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
         # The drawing is closed while the context still exists, even after an error.
         try:
             with shown_progress(title), contextlib.closing(steps):
-                for done in steps:
-                    if done < recording.n_frames:
-                        poll()  # after the last frame, the file may be complete at any moment
+                for _ in steps:
+                    pass
         except BaseException:  # also Ctrl-C
             kept = getattr(sink, "n_written", 0)
             if kept:

@@ -43,7 +43,7 @@ from viewer.export._left_out import rate_note
 from viewer.export._losses.motion_errors import frames_losses, resampling_losses
 from viewer.export._options import ExportOptions
 from viewer.formats._text.number_text import fixed_texts
-from viewer.interrupts import hold, poll
+from viewer.interrupts import hold
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import Remedy, Shown, counted, printable
 from viewer.progress import report
@@ -97,7 +97,6 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     stop = max(animation.first_frame + animation.frames.n_frames for animation in animations)
     with _new_folder(path) as folder:
         for frame in range(first, stop):
-            poll()
             report(frame - first, stop - first, "frames", f"writing {path.name}")
             rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"

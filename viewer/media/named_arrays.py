@@ -11,7 +11,6 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.interrupts import poll
 from viewer.media.saving import save_parts
 from viewer.progress import report_bytes
 
@@ -47,7 +46,6 @@ class _Compressed:
         """Compress a block."""
         assert self.member is not None  # set by the loop over the arrays
         for start in range(0, len(block), _BLOCK):
-            poll()
             part = block[start : start + _BLOCK]
             self.member.write(part)
             self._done += len(part)

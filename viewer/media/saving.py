@@ -8,7 +8,6 @@ import stat
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
-from typing import BinaryIO
 
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
@@ -110,7 +109,8 @@ def save_parts(
             # blocks forever, so signals must be able to interrupt it. The path is not resolved:
             # /dev/stdout may lead to a nameless pipe.
             with raising(), path.open("wb") as stream:
-                _write_parts(stream, parts)
+                for part in parts:
+                    stream.write(part)
         else:
             _replace(path.resolve(), parts, stat.S_IMODE(mode))
             note_output(path)
@@ -267,7 +267,8 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
-            _write_parts(stream, parts)
+            for part in parts:
+                stream.write(part)
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
@@ -277,12 +278,6 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
         with contextlib.suppress(OSError):
             Path(name).unlink()
         raise
-
-
-def _write_parts(stream: BinaryIO, parts: Iterable[bytes]) -> None:
-    for part in parts:
-        poll()
-        stream.write(part)
 
 
 def _reported(parts: Iterable[bytes], name: str, n_lines: int) -> Iterator[bytes]:
