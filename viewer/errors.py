@@ -46,12 +46,14 @@ class ViewerError(Exception):
     """
 
     exit_code = 2
+    is_shortened = False
+    """Whether the message contains names from files, which may be long."""
 
     def __init__(self, problem: str | Diagnostic = "") -> None:
         self.diagnostic = problem if isinstance(problem, Diagnostic) else None
         # Names of joints and figures come from files and may contain any character, as may file
         # names.
-        super().__init__(self._line(problem))
+        super().__init__(printable(problem, _LONGEST) if self.is_shortened else str(problem))
 
     @classmethod
     def fault(
@@ -64,9 +66,6 @@ class ViewerError(Exception):
     def cause(self) -> str | Diagnostic:
         """The diagnostic if there is one, otherwise the message; a value for another diagnostic."""
         return self.diagnostic or str(self)
-
-    def _line(self, problem: str | Diagnostic) -> str:
-        return str(problem)
 
 
 class FormatError(ViewerError):
@@ -91,15 +90,13 @@ class FormatError(ViewerError):
 class UnsupportedFormatError(ViewerError):
     """There is no reader or writer for this file format."""
 
-    def _line(self, problem: str | Diagnostic) -> str:
-        return printable(problem, _LONGEST)
+    is_shortened = True
 
 
 class RigError(ViewerError):
     """Parts of a figure are incompatible, or there is no part with a given name."""
 
-    def _line(self, problem: str | Diagnostic) -> str:
-        return printable(problem, _LONGEST)
+    is_shortened = True
 
 
 class RenderError(ViewerError):

@@ -300,7 +300,9 @@ def _with_clips(
         for index, (actor, partner) in enumerate(zip(actors, partners, strict=True)):
             if index in dealt or not moves[index]:
                 continue
-            fitting = [c for c in pool if _rank(c, actor, partner) == rank and _suits(c, actor)]
+            own = actor.figure.skeleton
+            ranked = [clip for clip in pool if _rank(clip, actor, partner) == rank]
+            fitting = [clip for clip in ranked if own is not None and suits(clip, own)]
             if fitting:
                 # Among clips with the same name, the actor's own comes first.
                 dealt[index] = next((c for c in fitting if c is actor.clip), fitting[0])
@@ -319,10 +321,6 @@ def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
     if clip is actor.clip:
         return 1
     return _N_RANKS if partner is None else _N_RANKS - 1
-
-
-def _suits(clip: Clip, actor: Actor) -> bool:
-    return actor.figure.skeleton is not None and suits(clip, actor.figure.skeleton)
 
 
 def _moved_by(actor: Actor, clip: Clip | None) -> Actor:

@@ -236,8 +236,9 @@ def _describe_morphs(shapes: BlendShapes) -> list[JsonObject]:
 
 
 def _morph_line(morph: JsonObject) -> str:
+    vertices = counted(morph["vertices"], "vertex")
     changes = f", changes {counted(morph['materials'], 'material')}" if morph["materials"] else ""
-    return f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}{changes}"
+    return f"  morph      {printable(morph['name'])}: moves {vertices}{changes}"
 
 
 def _lines(actor: JsonObject) -> list[str]:
@@ -277,10 +278,6 @@ def _box_text(actor: JsonObject) -> str:
     finest = 10.0 ** (1 - _BOX_DIGITS + math.floor(math.log10(size))) if size > 0.0 else 0.0
     points = _point(low, finest), _point(high, finest)
     return f"{points[0]} to {points[1]}, size {rounded(size, _BOX_DIGITS)}{unit}"
-
-
-def _vertices(count: int) -> str:
-    return counted(count, "vertex")
 
 
 def _skeleton_lines(skeleton: JsonObject) -> list[str]:
@@ -383,7 +380,11 @@ def _describe_model(actor: Actor, skinning: Skinning) -> JsonObject:
     if figure.mesh is not None and figure.unit == "m":
         model["rest"] = _rest(figure, pose)
     if pose is not None:
-        model |= _place(pose)
+        model |= {
+            "shape_weights": pose.shape_weights.tolist(),
+            "figure_translation": pose.figure_translation.tolist(),
+            "figure_scale": pose.figure_scale,
+        }
         if figure.pose_layout is not None and figure.skeleton is not None:
             from viewer.rig.posing.pose_vector import write_vector
 
@@ -410,14 +411,6 @@ def _rest(figure: Figure, pose: Pose | None) -> JsonObject:
         rest = replace(rest, mesh=replace(rest.mesh or mesh, positions=positions))
     found = measure(rest)
     return {"height": found.height, "volume": found.volume, "mass": found.mass}
-
-
-def _place(pose: Pose) -> JsonObject:
-    return {
-        "shape_weights": pose.shape_weights.tolist(),
-        "figure_translation": pose.figure_translation.tolist(),
-        "figure_scale": pose.figure_scale,
-    }
 
 
 def _annotations(figure: Figure) -> JsonObject:
@@ -463,7 +456,9 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
 
 def _model_lines(model: JsonObject, figure: Figure) -> list[str]:
     """Return the description as lines of text."""
-    lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
+    lines = [
+        f"  {name:<10} {printable(text, 400)}" for name, text in model.get("facts", {}).items()
+    ]
     if "rest" in model:
         rest = model["rest"]
         solid = "open mesh without a volume"
@@ -500,10 +495,6 @@ def _length(figure: Figure, value: float) -> str:
     from viewer.rig.scalars import length_text
 
     return length_text(figure, value)
-
-
-def _facts(model: JsonObject) -> list[tuple[str, str]]:
-    return list(model.get("facts", {}).items())
 
 
 def _describe_surface(material: Material) -> JsonObject:

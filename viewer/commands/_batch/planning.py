@@ -251,26 +251,6 @@ def _check_free(items: Sequence[Item]) -> None:
 
 def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, list[str]]:
     """Return the engine, its limits and a message."""
-    # Few small inputs are run in this process, because starting workers takes about a second.
-    limits = _limits(request, len(items))
-    if request.cluster:
-        return "dask_cluster", limits, _cluster_notes(request)
-    is_limited = request.timeout is not None or request.memory is not None
-    if request.workers is not None:
-        if request.workers == 0 and is_limited:
-            raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
-        return "processes" if request.workers else "sequential", limits, []
-    is_few = len(items) <= request.few and _size(items) < _SMALL
-    if is_few and not is_limited:
-        return "sequential", limits, []
-    if not is_limited and importlib.util.find_spec("pebble") is None:
-        note = "without pebble, one process runs everything (pip install pebble)"
-        return "sequential", limits, [note]
-    return "processes", limits, []
-
-
-def _limits(request: Request, n_items: int) -> Limits:
-    """Return the limits; raise ViewerError if one is invalid."""
     timeout = request.usual_timeout if request.timeout is None else request.timeout or None
     if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
@@ -286,8 +266,23 @@ def _limits(request: Request, n_items: int) -> Limits:
         # The cores of a login node say nothing about the cluster.
         cluster = parse_cluster(request.cluster)
         count = cluster.workers_per_job if cluster.kind == "slurm" else None
-    workers = max(1, min(count or _cores(), n_items))
-    return Limits(workers, request.retries, timeout, request.memory, request.cluster)
+    workers = max(1, min(count or _cores(), len(items)))
+    limits = Limits(workers, request.retries, timeout, request.memory, request.cluster)
+    if request.cluster:
+        return "dask_cluster", limits, _cluster_notes(request)
+    is_limited = request.timeout is not None or request.memory is not None
+    if request.workers is not None:
+        if request.workers == 0 and is_limited:
+            raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
+        return "processes" if request.workers else "sequential", limits, []
+    # Few small inputs are run in this process, because starting workers takes about a second.
+    is_few = len(items) <= request.few and _size(items) < _SMALL
+    if is_few and not is_limited:
+        return "sequential", limits, []
+    if not is_limited and importlib.util.find_spec("pebble") is None:
+        note = "without pebble, one process runs everything (pip install pebble)"
+        return "sequential", limits, [note]
+    return "processes", limits, []
 
 
 def _cluster_notes(request: Request) -> list[str]:
