@@ -8,8 +8,8 @@ from pathlib import Path
 
 from viewer.batching.items import Item
 from viewer.errors import ViewerError
+from viewer.media.output_checks import check_targets
 from viewer.media.saving import save_parts
-from viewer.media.targets import check_targets
 
 
 def misbehave(item: Item) -> dict[str, int]:

@@ -7,8 +7,8 @@ import pytest
 
 from viewer.errors import OutputError
 from viewer.formats import check_folder_target, check_targets
+from viewer.media.output_checks import replacing_since
 from viewer.media.saving import free_path
-from viewer.media.targets import replacing_since
 
 
 def refused(files, inputs=(), force=False, check=check_targets) -> str:

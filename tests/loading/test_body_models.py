@@ -19,7 +19,7 @@ from viewer.errors import OutputError
 from viewer.formats.anny import ACTIONS
 from viewer.loading import Contents, MotionSettings, load
 from viewer.loading.assembly import begin
-from viewer.media.targets import check_targets
+from viewer.media.output_checks import check_targets
 from viewer.models import save_model_folder
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.capture import Capture, CapturePart

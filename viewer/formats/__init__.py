@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from viewer.media.file_names import file_stem, folder_name, opened_text
     from viewer.media.image import is_picture, save_image
     from viewer.media.named_arrays import save_arrays
+    from viewer.media.output_checks import check_folder_target, check_targets
     from viewer.media.saving import (
         all_or_none,
         free_path,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
         save_parts,
         save_text,
     )
-    from viewer.media.targets import check_folder_target, check_targets
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure, FigureGroup
     from viewer.rig.morph_target import MorphTarget
@@ -216,7 +216,7 @@ _REEXPORTED = {
         *("all_or_none", "free_path", "keeping_written"),
         *("save_bytes", "save_parts", "save_text"),
     ),
-    "viewer.media.targets": ("check_folder_target", "check_targets"),
+    "viewer.media.output_checks": ("check_folder_target", "check_targets"),
 }
 """Names that the package re-exports, by module; each module is imported on first use."""
 

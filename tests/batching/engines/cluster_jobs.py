@@ -8,7 +8,7 @@ from pathlib import Path
 from viewer.batching.items import Item, Result
 from viewer.batching.worker_process import worker_rank
 from viewer.errors import OutputError
-from viewer.media.targets import check_targets
+from viewer.media.output_checks import check_targets
 
 
 @dataclass

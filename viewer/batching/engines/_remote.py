@@ -16,7 +16,7 @@ from viewer.batching.engines._task_size import LONGEST
 from viewer.batching.items import Item, Result
 from viewer.batching.worker_process import limit_memory, name_worker
 from viewer.data_classes import dataclass
-from viewer.media.targets import replacing_since
+from viewer.media.output_checks import replacing_since
 from viewer.version import VERSION
 
 ENDED = "viewer-ended"

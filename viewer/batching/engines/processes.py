@@ -27,7 +27,7 @@ from viewer.batching.worker_process import limit_memory, signals_blocked
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
-from viewer.media.targets import replacing_since
+from viewer.media.output_checks import replacing_since
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
