@@ -59,8 +59,8 @@ def in_window() -> Iterator[None]:
 @contextmanager
 def as_data() -> Iterator[None]:
     """Word the messages of this thread for the command line, even while a window is open."""
-    # For JSON and records of runs, which are read elsewhere: programs that compare them find one
-    # wording, and ``render --panels`` opens a window's interface without a user in front of it.
+    # JSON and records of runs are read elsewhere: programs that compare them find one wording, and
+    # ``render --panels`` opens a window's interface without a user in front of it.
     before = _is_data.set(True)
     try:
         yield

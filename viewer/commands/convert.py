@@ -222,7 +222,8 @@ def convert_streamed(
     asked: SceneOptions, options: ExportOptions, output: Path
 ) -> list[Diagnostic] | None:
     """Convert a long, regular file part by part; print warnings and return the notes."""
-    # None if the files or options need the whole motion in memory; the output is then unchanged.
+    # The result is None if files or options need the whole motion in memory; the output is then
+    # unchanged.
     if not _is_streamable(asked, options.kind, output):
         return None
     from viewer.formats.bvh.motion import Irregular

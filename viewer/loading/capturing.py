@@ -114,8 +114,8 @@ class Builder:
 
     def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
         """Read the next part; return new actors and messages."""
-        # For captures that are read to the end before they are shown: the motions of driven figures
-        # are computed once, at the end.
+        # Captures that are read to the end before they are shown compute the motions of driven
+        # figures once, at the end.
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True

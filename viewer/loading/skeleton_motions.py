@@ -58,7 +58,7 @@ def give_skeleton_motion(
     model: Figure | None,
 ) -> Lone | None:
     """Apply a motion to the model, else to the first figure with its joint names."""
-    # Returns the separate skeleton, if the motion drives no figure.
+    # The result is the separate skeleton, if the motion drives no figure.
     motion = as_asked(motion, settings)
     for note in motion.up_notes:
         draft.note(

@@ -35,8 +35,8 @@ def check_targets(
     files: Sequence[Path], inputs: Iterable[Path], force: bool, hint: str = _FORCE
 ) -> None:
     """Refuse a run if one of its output files may not be written, before anything is written."""
-    # The first file that is a folder or an input, already exists, is written twice, is in a folder
-    # that is missing or read-only, or is a closed standard output. Links are resolved.
+    # It refuses the first file that is a folder or an input, exists, is written twice, is in a
+    # missing or read-only folder, or is a closed standard output. Links are resolved.
     opened = _Inputs(inputs)
     written: dict[_Identity, Path] = {}
     folders: set[Path] = set()

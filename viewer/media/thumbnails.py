@@ -23,7 +23,7 @@ _MOST_BYTES = 256 << 20  # maximum size of a file
 
 def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:
     """Return an image, or a video's middle frame, reduced to fit a box; None if unreadable."""
-    # (H, W, 4) uint8, first row at the top. Small images are not enlarged.
+    # Pixels are (H, W, 4) uint8, first row at the top. Small images are not enlarged.
     pixels = _pixels(Path(path))
     if pixels is None:
         return None

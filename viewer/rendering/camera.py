@@ -249,7 +249,7 @@ def follow_view(
 
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:
     """Aim at the centre of points, (N, 3), and step back until all are visible."""
-    # Of the image's height, a fraction ``free_height`` about its centre is used.
+    # Only a fraction ``free_height`` of the image's height, about its centre, is used.
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
     tangent = math.tan(math.radians(camera.fov) / 2)

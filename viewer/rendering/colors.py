@@ -150,8 +150,8 @@ def oklab(colors: Floats) -> Floats:
 def joint_palette(parents: Ints) -> Bytes:
     """Return a clearly different colour for neighbouring joints: (J, 4) uint8, sRGB and alpha."""
     # Neighbours of a joint are its parent, its grandparent, its siblings and its parent's siblings.
-    # Among the least-used colours, the one farthest from all neighbours is chosen, also as colour-
-    # blind people see it.
+    # Among the least-used colours, the one farthest from all neighbours is chosen, also as
+    # colour-blind people see it.
     bright = decode_srgb(_JOINT_COLORS / 255.0)
     linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
     distances = _distances(linear)

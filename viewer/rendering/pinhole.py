@@ -109,7 +109,7 @@ def frustum_depth(box: Floats) -> float:
 
 def frustum_corners(camera: CameraView, depth: float) -> Floats:
     """Return the corners of a camera's image at a depth: (4, 3), scene space."""
-    # Clockwise from the upper left; these are the corners of the outermost pixels, with X = R^T (d
+    # They are clockwise from the upper left, at the corners of the outermost pixels: X = R^T (d
     # K^-1 u - T), without lens distortion.
     width, height = picture_size(camera)
     k = camera.intrinsic / camera.intrinsic[2, 2]

@@ -39,8 +39,8 @@ def project_segments(
     view: View, size: tuple[int, int], starts: Floats, ends: Floats
 ) -> tuple[Floats, Bools]:
     """Project segments, ends (N, 3) in scene space, clipped at the near plane: -c_w <= c_z."""
-    # Returns both ends, (N, 2, 2) pixels from the image's left and upper edges, which may lie
-    # outside the image, and a mask of the segments of which a part is beyond the near plane.
+    # The pixels, (N, 2, 2), from the image's left and upper edges, may lie outside the image; the
+    # mask says which segments have a part beyond the near plane.
     clips = np.stack([_clip(view, starts), _clip(view, ends)], axis=1)
     away = clips[..., 2] + clips[..., 3]
     seen: Bools = np.any(away > 0.0, axis=1)
@@ -56,7 +56,7 @@ def project_segments(
 
 def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
     """Return the points, (N, 3), at pixels, (N, 2), with the depths of other points, (N, 3)."""
-    # (P V)^-1 c with the points' own c_z and c_w; they must be in front of the eye.
+    # They are (P V)^-1 c with the points' own c_z and c_w, which must be in front of the eye.
     clip = _clip(view, points)
     clip[:, 0] = (2.0 * pixels[:, 0] / size[0] - 1.0) * clip[:, 3]
     clip[:, 1] = (1.0 - 2.0 * pixels[:, 1] / size[1]) * clip[:, 3]

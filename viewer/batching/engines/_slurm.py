@@ -33,7 +33,7 @@ def slurm_cluster(
     name: ClusterName, memory: int | None, settings: Mapping[str, object]
 ) -> SLURMCluster:
     """Return a cluster whose workers are SLURM jobs; none is submitted yet."""
-    # The options that describe a job; all others are passed to sbatch.
+    # These options describe a job; all others are passed to sbatch.
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "

@@ -275,8 +275,8 @@ _Point: TypeAlias = tuple[float, float, float]
 
 def _octahedron() -> Floats:
     """Return a flat octahedron from a joint to its child, with a ridge on one side: (N, 7)."""
-    # Corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat triangles;
-    # tint, 1 for the ridge, which shows the roll.
+    # Each row is a corner of a triangle: x and z in half-widths, y in lengths; the normal, 0 for
+    # flat triangles; the tint, 1 for the ridge, which shows the roll.
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]
     ring += [(-1.0, _WIDEST, 0.0), (0.0, _WIDEST, -_FLATNESS)]
     head, tail = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -33,7 +33,7 @@ _orders: Memo[Figure, Ints] = Memo()
 class MeshRun:
     """Consecutive triangles of one material, and of one part until runs are merged."""
 
-    # First index, number of indices, surface, and part; -1 for several or none.
+    # Indices are counted from the buffer's start; the part is -1 for several or none.
 
     first: int
     count: int
