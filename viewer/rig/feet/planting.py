@@ -301,7 +301,7 @@ class _FootPlan:
         is_alone = 1.0 - np.delete(self.holds(), foot, axis=1).max(axis=1, initial=0.0)
         raised = (is_alone * np.clip(-sunk, 0.0, limits.CLEARS * self.size))[:, None]
         smooth = _smoothed(self, raised, np.ones(len(raised)), _LEVELS)
-        return lowest + np.minimum(raised, smooth)[:, 0]
+        return lowest + np.clip(smooth, 0.0, raised)[:, 0]
 
 
 def _foot_plan(
