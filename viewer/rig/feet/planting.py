@@ -57,7 +57,7 @@ _EXTENDED = 0.97
 
 # Longer beginnings and ends of contacts, seconds, tried one after the other while knees grow by
 # more than a factor of _CALM. Six recordings stay at 1.06 without any: 1.15 is beyond such chance,
-# and too little to be seen. Kneeling, in which feet are lifted far, falls from 1.39 to 1.00 with
+# and too little to be seen. Kneeling, in which feet are lifted far, falls from 1.26 to 1.00 with
 # 0.1 s. Beyond 0.2 s, a third of a step of 0.6 s at either end, nothing of it would be held.
 _EASES, _CALM = (0.1, 0.2), 1.15
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
@@ -466,7 +466,7 @@ _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 # Number of passes that lift sinking feet, and their weight relative to the stiffness s^4 of the
 # curves. Without any, a foot of the short legs sinks by 13 % of the body; one pass leaves 0.13 %,
 # three 0.05 %, seven 0.015 % (0.3 mm). A stronger pull needs fewer, but makes a kink where the foot
-# would have touched the ground: knees of kneeling grow by 1.3 at 0.25 and by 2.2 at 4.
+# would have touched the ground: knees of kneeling grow by 1.3 at 0.25 and by 1.9 at 4.
 _LIFTS, _LIFTED = 7, 0.25
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
 
