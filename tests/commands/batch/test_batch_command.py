@@ -4,7 +4,6 @@ import csv
 import json
 import re
 import shlex
-from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -378,7 +377,7 @@ def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatc
     monkeypatch.setattr(jobs, "_device", lambda: 3)
     item = Item(0, ("a.glb",), "", "a.glb")
     for given in (None, 1):
-        job = CommandJob("render", Namespace(files=[], gpu=given))
+        job = CommandJob("render", {"files": [], "gpu": given})
         assert job(item).status == "done" and job.uses_gpu
     assert used == [3, 1]
 

@@ -17,6 +17,7 @@ from viewer.commands._batch.planning import TIMEOUT, add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
+from viewer.diagnostics.record import JsonObject
 from viewer.formats._figure_cache import keeping_figures
 from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
@@ -104,8 +105,8 @@ class CommandJob:
 
     command: str
     """A key of ``JOBS``."""
-    arguments: argparse.Namespace
-    """Its arguments, without files and output."""
+    options: JsonObject
+    """Its options by name, and arguments that each item replaces: files and output."""
     fixed: tuple[str, ...] = ()
     """Files that are opened with every item."""
     shared: tuple[str, ...] = ()
@@ -134,7 +135,7 @@ class CommandJob:
     def _run(self, item: Item) -> int:
         given = {
             name: [*value] if isinstance(value, list) else value
-            for name, value in vars(self.arguments).items()
+            for name, value in self.options.items()
         }
         arguments = argparse.Namespace(**given)
         arguments.files = [*self.fixed, *item.files]

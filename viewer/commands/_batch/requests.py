@@ -34,6 +34,7 @@ from viewer.commands._input_files import input_files
 from viewer.commands._settings import settings_of
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
+from viewer.diagnostics.record import JsonObject
 from viewer.errors import ViewerError
 from viewer.media.unfinished import new_prefix
 from viewer.models import named_files, use_model_folder
@@ -54,20 +55,23 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         raise ViewerError(
             f"expected -o OUT, a folder or a template, found none ({name} writes files)"
         )
-    command = _command_arguments(arguments)
+    parser = Parser(prog=f"viewer {name}")
+    add_job_arguments(parser, name)
+    known = {action.dest for action in parser._actions if action.dest != "help"}
+    options = {each: getattr(arguments, each) for each in known | parser._defaults.keys()}
     remark = ""
-    if getattr(command, "model_path", None) is not None:
-        remark = use_model_folder(command.model_path)
+    if options.get("model_path") is not None:
+        remark = use_model_folder(options["model_path"])
         if not remark:  # remembered: items need not name it again
-            command.model_path = None
+            options["model_path"] = None
     shared = getattr(arguments, "fixed", [])
     fixed = [str(path) for file in shared for path in named_files(file)]
     for file in fixed:
         if not os.path.exists(file):
             raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
-    if arguments.resume and hasattr(command, "force"):
+    if arguments.resume and "force" in options:
         # Outputs of items that the report does not list were written by a killed run.
-        command.force = True
+        options["force"] = True
     paths, notes = _inputs(name, arguments.files)
     request = settings_of(
         Request,
@@ -77,8 +81,8 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         # A template includes the suffix.
         to=getattr(arguments, "to", None) or ("" if "{" in output else kind.suffix),
         keeps_folders=kind.is_folder_input,
-        identity=_identity(name, command, getattr(arguments, "expect", [])),
-        shared=tuple(dict.fromkeys([*fixed, *_files_in(command)])),
+        identity=_identity(name, options, getattr(arguments, "expect", [])),
+        shared=tuple(dict.fromkeys([*fixed, *_files_in(options)])),
         few=kind.few,
         force=arguments.force,
         usual_timeout=kind.timeout,
@@ -89,9 +93,9 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     )
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)
-    job: Job = CommandJob(name, command, tuple(fixed), tuple(request.shared))
+    job: Job = CommandJob(name, options, tuple(fixed), tuple(request.shared))
     if name == "diff":
-        alike = patterns_of(input_files(command.reference))
+        alike = patterns_of(input_files(options["reference"]))
         job = _SubmissionJob(job, tuple(arguments.expect), tuple(alike), _temporary_folder())
     return request, job
 
@@ -106,24 +110,15 @@ def _inputs(job: str, files: list[str]) -> tuple[list[str], list[str]]:
     return [*map(str, found.submissions)], [note] if found.ignored else []
 
 
-def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
-    """Return the arguments of the job's command."""
-    parser = Parser(prog=f"viewer {arguments.job}")
-    add_job_arguments(parser, arguments.job)
-    names = {action.dest for action in parser._actions if action.dest != "help"}
-    names |= parser._defaults.keys()
-    return argparse.Namespace(**{name: getattr(arguments, name) for name in names})
-
-
-def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
+def _identity(job: str, options: JsonObject, expected: Sequence[str]) -> str:
     """Return a string that identifies job, options and version, on which results depend."""
-    options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
-    return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
+    kept = {name: value for name, value in options.items() if name not in _NOT_RESULTS}
+    return json.dumps([job, VERSION, kept, *expected], sort_keys=True, default=str)
 
 
-def _files_in(command: argparse.Namespace) -> Iterator[str]:
+def _files_in(options: JsonObject) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
-    for name, value in sorted(vars(command).items()):
+    for name, value in sorted(options.items()):
         if name in _NOT_RESULTS or name == "save_joint_map":  # this file is an output
             continue
         for text in value if isinstance(value, list) else [value]:
