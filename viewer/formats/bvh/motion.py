@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
-from viewer.errors import FormatError
 from viewer.formats._frame_gaps import gap_notes, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
@@ -29,7 +28,6 @@ from viewer.rig.geometry.quaternion import align_signs
 
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)
-_LINE = re.compile(rb"[^\r\n]+")
 _ROUNDING = 1e-4  # positions of 0 in files with few decimals, relative to the longest OFFSET
 PART = 1 << 19
 """Bytes of text from which frames are read together, and the rest of the last line."""
@@ -179,7 +177,8 @@ def _faulty_rows(
     source: Source, start: int, width: int, declared: int | None
 ) -> tuple[Floats, Bools | None]:
     """Return all complete frames, (N, C), and which of them are gaps, if any; record faults."""
-    held = _held_frames(source, start, width, declared)
+    words = read_words(source.data, start, len(source.data))
+    held = _held_frames(source, words, width, declared)
     if held is not None:
         return held
     values, bad = parse_numbers(source.data, start, len(source.data), is_kept=False)
@@ -197,7 +196,7 @@ def _faulty_rows(
             found=quoted(word),
         )
     if rest or (declared is not None and whole != declared):
-        _check_lines(source, start, width, declared)
+        _check_lines(source, words, width, declared)
         _warn_of_difference(source, width, declared, whole, rest)
     if whole == 0:
         source.warn("F007.bvh-empty: no frames: shown in the rest pose", start)
@@ -205,10 +204,9 @@ def _faulty_rows(
 
 
 def _held_frames(
-    source: Source, start: int, width: int, declared: int | None
+    source: Source, words: Words, width: int, declared: int | None
 ) -> tuple[Floats, Bools | None] | None:
     """Record all errors in the frames; return frames and gaps, None if their starts are unknown."""
-    words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
     rest = 0
     if (sizes == width).sum() * 2 > len(sizes):  # the file has one frame per line
@@ -277,30 +275,25 @@ def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: in
     return lost
 
 
-def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
+def _check_lines(source: Source, words: Words, width: int, declared: int | None) -> None:
     """Refuse a file with one frame per line if a row other than the last has a wrong length."""
-    lines = [
-        (line.start(), len(line.group().split())) for line in _LINE.finditer(source.data, start)
-    ]
-    lines = [line for line in lines if line[1]]
-    odd = [(at, row) for row, (at, found) in enumerate(lines) if found != width]
-    if not odd or len(lines) < 2:
+    begins, sizes = words.rows()
+    odd = np.flatnonzero(sizes != width)
+    if len(odd) == 0 or len(sizes) < 2:
         return
-    if len(odd) == len(lines):
-        # If no row has the right length, each line is a frame only if all lines have the same
-        # count.
-        if len(lines) == declared:
-            raise _wrong_row(source, 0, width, lines[0])
-        return
-    row = odd[0][1]
-    if row < len(lines) - 1 or lines[row][1] > width:
-        raise _wrong_row(source, row, width, lines[row])
-
-
-def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> FormatError:
-    return source.fault(
-        wording.BVH_ROW, line[0], frame=row, expected=counted(width, "number"), found=line[1]
-    )
+    row = int(odd[0])
+    is_wrong = bool(row < len(sizes) - 1 or sizes[row] > width)
+    if len(odd) == len(sizes):
+        # No row has the right length: lines are frames only if there are as many as declared.
+        is_wrong = len(sizes) == declared
+    if is_wrong:
+        raise source.fault(
+            wording.BVH_ROW,
+            int(words.offsets[begins[row]]),
+            frame=row,
+            expected=counted(width, "number"),
+            found=int(sizes[row]),
+        )
 
 
 def _warn_of_difference(
