@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from app.tiny import write_rig
 
-from viewer.app.actors.following import start_following
+from viewer.app.actors.following import toggle_following
 from viewer.app.pace import Pace
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.toolbar import choose_tool
@@ -96,7 +96,7 @@ def show_everything(state):
     select_joint(state, 1)
     pin_vertex(state, 0, 0)
     show_scalar(state, "field" if state.actor.figure.fields else "weight")
-    start_following(state, 0, 1)
+    toggle_following(state, 0, 1)
 
 
 def test_edited_pose_runs_kinematics_once(hand, runs):

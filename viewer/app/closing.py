@@ -13,7 +13,7 @@ from viewer.app.core.edited_animations import Animations, edited_aside
 from viewer.app.core.jobs import Job
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, explain, same_line_if_room
+from viewer.app.core.widgets import begin_dialog, button, explain, same_line_if_room
 from viewer.app.curves.editing import ask_for_clip
 from viewer.app.files.files import Files
 from viewer.app.files.motion_export import ask_for_motion
@@ -127,7 +127,14 @@ def question_of(state: AppState) -> _Question | None:
         return None
     job = _job(state)
     if closing.is_requested and job is not None:
-        return None if closing.waits or job.is_cancelled else _about_job(job)
+        if closing.waits or job.is_cancelled:
+            return None
+        answers = (
+            ("Finish first", "the window closes when it is finished", _wait),
+            (f"Cancel {job.output} and quit", "existing files are kept", _cancel_job),
+            ("Keep working", "keep the window open", keep_open),
+        )
+        return _Question("Unfinished work", (f"{job.title} is not finished yet.",), answers)
     loader = files.loader
     if closing.is_requested:
         purpose = "quitting"
@@ -150,18 +157,6 @@ def _edits(state: AppState) -> list[_Unsaved]:
     # The edits of this frame count too.
     state.observe()
     return [] if state.of(Closing).discards else unsaved_edits(state)
-
-
-def _about_job(job: Job) -> _Question:
-    return _Question(
-        "Unfinished work",
-        (f"{job.title} is not finished yet.",),
-        (
-            ("Finish first", "the window closes when it is finished", _wait),
-            (f"Cancel {job.output} and quit", "existing files are kept", _cancel_job),
-            ("Keep working", "keep the window open", keep_open),
-        ),
-    )
 
 
 def _wait(state: AppState) -> None:
@@ -198,7 +193,22 @@ def _about_edits(edits: list[_Unsaved], purpose: str) -> _Question:
 
 def unsaved_edits(state: AppState) -> list[_Unsaved]:
     """Return the edits that no file contains; those that were undone are not listed."""
-    return [*_keys(state), *_poses(state), *_matches(state), *_rigs(state)]
+    poses = [
+        _Unsaved(f"{printable(actor.name, _LONGEST)}: pose", _for_actor(row, ask_for_pose))
+        for row, actor in enumerate(state.scene.actors)
+        if _is_posed_by_hand(state, actor)
+    ]
+    return [*_keys(state), *poses, *_matches(state), *_rigs(state)]
+
+
+def _for_actor(row: int, ask: Callable[[AppState], None]) -> Callable[[AppState], None]:
+    """Return an action that chooses an actor and then asks where to save something of it."""
+
+    def choose_and_ask(state: AppState) -> None:
+        state.choose_actor(row)
+        ask(state)
+
+    return choose_and_ask
 
 
 def _keys(state: AppState) -> list[_Unsaved]:
@@ -209,17 +219,17 @@ def _keys(state: AppState) -> list[_Unsaved]:
         is_read = any(animation.plays(clip) for animation in actor.figure.animations)
         if clip is not None and clip not in saved and not is_read:
             text = f"{name}: keys of {printable(clip.name, _LONGEST)}"
-            found.append(_Unsaved(text, partial(_ask_for_keys, row=row, index=-1)))
+            found.append(_Unsaved(text, _for_actor(row, _ask_for_keys)))
         for index, aside in edited_aside(state.of(Animations), actor).items():
             if aside not in saved:
                 text = f"{name}: keys of {printable(aside.name, _LONGEST)}"
-                found.append(_Unsaved(text, partial(_ask_for_keys, row=row, index=index)))
+                ask = partial(_ask_for_keys, index=index)
+                found.append(_Unsaved(text, _for_actor(row, ask)))
     return found
 
 
-def _ask_for_keys(state: AppState, row: int, index: int) -> None:
-    """Ask where to save an actor's keys; ``index``: the animation to play first, -1 for none."""
-    state.choose_actor(row)
+def _ask_for_keys(state: AppState, index: int = -1) -> None:
+    """Ask where to save the chosen actor's keys, those of an animation if it has an index."""
     if index >= 0:
         choose_animation(state, index)
     if state.actor.keyed is not None and state.actor.transforms is None:
@@ -228,15 +238,6 @@ def _ask_for_keys(state: AppState, row: int, index: int) -> None:
     # Only an export of the whole motion contains all keys.
     state.clock.set_range(*state.clock.whole)
     ask_for_motion(state, ".glb")
-
-
-def _poses(state: AppState) -> list[_Unsaved]:
-    """Return the poses and shapes that were made by hand."""
-    return [
-        _Unsaved(f"{printable(actor.name, _LONGEST)}: pose", partial(_ask_for_pose, row=row))
-        for row, actor in enumerate(state.scene.actors)
-        if _is_posed_by_hand(state, actor)
-    ]
 
 
 def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
@@ -274,11 +275,6 @@ def _is_same(actor: Actor, pose: Pose) -> bool:
     )
 
 
-def _ask_for_pose(state: AppState, row: int) -> None:
-    state.choose_actor(row)
-    ask_for_pose(state)
-
-
 def _matches(state: AppState) -> list[_Unsaved]:
     """Return the joint matches chosen by hand; people of a capture have one in common."""
     saved, found = state.of(SavedWork), dict[int, _Unsaved]()
@@ -287,13 +283,8 @@ def _matches(state: AppState) -> list[_Unsaved]:
         joint_map = None if drive is None else drive.joint_map
         if joint_map is not None and joint_map not in saved:
             text = f"{printable(actor.name, _LONGEST)}: joint match"
-            found.setdefault(id(joint_map), _Unsaved(text, partial(_ask_for_match, row=row)))
+            found.setdefault(id(joint_map), _Unsaved(text, _for_actor(row, ask_where_to_save)))
     return [*found.values()]
-
-
-def _ask_for_match(state: AppState, row: int) -> None:
-    state.choose_actor(row)
-    ask_where_to_save(state)
 
 
 def _rigs(state: AppState) -> list[_Unsaved]:
@@ -312,13 +303,7 @@ def draw_question(state: AppState) -> None:
     question = question_of(state)
     if question is None:
         return
-    title = f"{question.title}###closing"
-    imgui.open_popup(title)
-    viewport = imgui.get_main_viewport()
-    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, (0.5, 0.5))
-    width = min(_WIDTH * imgui.get_font_size(), 0.92 * viewport.size.x)
-    imgui.set_next_window_size((width, 0.0))
-    opened, stays = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
+    opened, stays = begin_dialog(question.title, _WIDTH * imgui.get_font_size(), "closing")
     if not opened:
         return
     answer: Callable[[AppState], None] | None = None if stays else keep_open

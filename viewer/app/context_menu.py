@@ -6,7 +6,7 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.actors.following import Following, toggle_following
 from viewer.app.actors.parts_panel import isolate_part, part_label, set_part_shown
 from viewer.app.core.reasons import no_pose, no_skeleton
 from viewer.app.core.state import AppState
@@ -71,7 +71,26 @@ def draw_context_menu(state: AppState) -> None:
         _draw_part(state, spot)
         _draw_actor(state, spot)
     else:
-        _draw_background(state)
+        draw_views(state)
+        imgui.separator()
+        hidden = [actor for actor in state.scene.actors if not actor.visible]
+        why = "" if hidden else "no actor is hidden"
+        if menu_item(state, "Show all actors", why=why):
+            for actor in hidden:
+                actor.visible = True
+        nothing = state.selected_joint < 0 and not state.is_actor_selected
+        if menu_item(state, "Deselect", "Esc", why="nothing is selected" if nothing else ""):
+            state.deselect()
+        if menu_item(state, "Paste pose", "Ctrl+V", why=no_pose(state)):
+            paste_pose(state)
+        imgui.separator()
+        if menu_item(state, "Grid", "G", state.options.grid):
+            toggle_option(state, "grid", "Grid")
+        if menu_item(state, "X-ray", "B", state.options.xray, no_skeleton(state)):
+            toggle_option(state, "xray", "X-ray")
+        if begin_menu(state, "Bones", not no_skeleton(state)):
+            draw_bone_styles(state)
+            imgui.end_menu()
     imgui.separator()
     if menu_item(state, "Find an action…", "Ctrl+P"):
         toggle_palette(state)
@@ -163,34 +182,11 @@ def _draw_actor(state: AppState, spot: Spot) -> None:
             act(state)
 
 
-def _draw_background(state: AppState) -> None:
-    draw_views(state)
-    imgui.separator()
-    hidden = [actor for actor in state.scene.actors if not actor.visible]
-    why = "" if hidden else "no actor is hidden"
-    if menu_item(state, "Show all actors", why=why):
-        for actor in hidden:
-            actor.visible = True
-    nothing = state.selected_joint < 0 and not state.is_actor_selected
-    if menu_item(state, "Deselect", "Esc", why="nothing is selected" if nothing else ""):
-        state.deselect()
-    if menu_item(state, "Paste pose", "Ctrl+V", why=no_pose(state)):
-        paste_pose(state)
-    imgui.separator()
-    if menu_item(state, "Grid", "G", state.options.grid):
-        toggle_option(state, "grid", "Grid")
-    if menu_item(state, "X-ray", "B", state.options.xray, no_skeleton(state)):
-        toggle_option(state, "xray", "X-ray")
-    if begin_menu(state, "Bones", not no_skeleton(state)):
-        draw_bone_styles(state)
-        imgui.end_menu()
-
-
 def _draw_following(state: AppState, text: str, actor: int, joint: int) -> None:
     """Draw the item that lets the camera follow an actor or joint."""
     follows = state.of(Following).target == (actor, joint)
     if menu_item(state, text, "", follows):
-        stop_following(state) if follows else start_following(state, actor, joint)
+        toggle_following(state, actor, joint)
 
 
 def _choose_actor(state: AppState, index: int) -> None:

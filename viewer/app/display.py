@@ -126,7 +126,7 @@ def stop_watching() -> None:
         _library = None
 
 
-def _pass_over(display: Any, event: Any) -> int:
+def _pass_over(display: int | None, event: ctypes._Pointer[_ErrorEvent]) -> int:
     """Ignore an answer to a window that is gone; leave any other error to the previous handler."""
     found = event.contents
     if found.error == _BAD_WINDOW and found.request in _TO_OTHERS:
@@ -134,7 +134,7 @@ def _pass_over(display: Any, event: Any) -> int:
     return int(_before[1](display, event))
 
 
-def _leave(_: Any) -> int:
+def _leave(_: object) -> int:
     """Remove partial files, print the reason, and exit."""
     try:
         remove_unfinished()

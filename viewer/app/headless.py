@@ -64,7 +64,11 @@ class HeadlessApp:
             imgui.new_frame()
             self.screen.framebuffer.use()  # drawing and picking need a bound framebuffer
             self.frame.run(self.pixels_per_point)
-            _upload_textures()
+            # Glyphs that ImGui has requested, which painting would upload otherwise.
+            for texture in imgui.get_platform_io().textures:
+                if texture.status != imgui.ImTextureStatus.ok:
+                    # This function is missing from the stubs of imgui-bundle.
+                    imgui.backends.opengl3_update_texture(texture)  # type: ignore[attr-defined,unused-ignore]
 
     def _make_current(self) -> None:
         """Make this context current, because another one may have been used since."""
@@ -122,11 +126,3 @@ def _names(state: AppState) -> Iterator[str]:
         yield from () if figure.skeleton is None else figure.skeleton.names
         yield from () if figure.blend_shapes is None else figure.blend_shapes.names
         yield from () if figure.mesh is None else figure.mesh.parts
-
-
-def _upload_textures() -> None:
-    """Upload the glyph textures that ImGui has requested, which painting would do otherwise."""
-    for texture in imgui.get_platform_io().textures:
-        if texture.status != imgui.ImTextureStatus.ok:
-            # This function is missing from the stubs of imgui-bundle.
-            imgui.backends.opengl3_update_texture(texture)  # type: ignore[attr-defined,unused-ignore]

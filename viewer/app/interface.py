@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.core.messages import Message, message_line
+from viewer.app.core.messages import message_line
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.state import AppState
-from viewer.app.core.theme import ERROR, ink
-from viewer.app.core.widgets import begin_window, button, checkbox, explain, same_line_if_room
+from viewer.app.core.theme import ERROR, text_color
+from viewer.app.core.widgets import (
+    begin_dialog,
+    begin_window,
+    button,
+    checkbox,
+    explain,
+    same_line_if_room,
+)
 from viewer.app.features import KEYS
 from viewer.app.layout import (
     PANELS,
@@ -28,8 +35,6 @@ from viewer.app.overlays import draw_overlays
 from viewer.app.preferences.preferences_window import draw_preferences
 from viewer.phrases import printable
 
-_ERROR_TITLE = "Error"
-_TITLE = "Messages"
 _SIZE = (42.0, 22.0)  # initial size of the window, in font sizes
 _LONGEST = 1000  # maximum length of a message in characters
 
@@ -65,26 +70,19 @@ def draw_interface(state: AppState) -> None:
     _draw_error(state)
 
 
-def _dock_of_neighbour(panel: Panel) -> int:
-    """Return the dock node of another panel with the same initial dock, or 0 if none is docked."""
-    for other in PANELS.values():
-        window = None
-        if other.place == panel.place and other is not panel:
-            window = imgui.internal.find_window_by_name(other.title)
-        if window is not None and window.dock_id:
-            return int(window.dock_id)
-    return 0
-
-
 def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     """Draw one panel; return whether it has just appeared."""
     # A panel that appears together with a figure must not cover other panels.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
-    neighbour = _dock_of_neighbour(panel)
-    if neighbour:
-        # A panel that is missing from the stored layout would float over the other panels.
-        imgui.set_next_window_dock_id(neighbour, imgui.Cond_.first_use_ever)
+    for other in PANELS.values():
+        window = None
+        if other.place == panel.place and other is not panel:
+            window = imgui.internal.find_window_by_name(other.title)
+        if window is not None and window.dock_id:
+            # A panel that is missing from the stored layout would float over its neighbours.
+            imgui.set_next_window_dock_id(window.dock_id, imgui.Cond_.first_use_ever)
+            break
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()
     if shown:
@@ -99,40 +97,28 @@ def _draw_message_window(state: AppState) -> None:
     """Draw the window if it is open."""
     if not state.messages.is_open:
         return
-    shown, stays = begin_window(_TITLE, _SIZE)
+    shown, stays = begin_window("Messages", _SIZE)
     if shown:
-        _draw_content(state)
+        listed = state.messages.log.listed(state.messages.lists_status)
+        if button(state, "Copy all", "" if listed else "no messages yet"):
+            imgui.set_clipboard_text("\n".join(map(message_line, listed)))
+        explain("copy the messages to the clipboard, one per line")
+        text = "Results of keys and buttons"
+        same_line_if_room(text)
+        state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
+        if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
+            # New messages are appended; the end stays visible unless the user scrolls away.
+            follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
+            if not listed:
+                imgui.text_disabled("no messages yet")
+            for message in listed:
+                with text_color(ERROR if message.kind == "error" else None):
+                    imgui.text_wrapped(printable(message_line(message), _LONGEST))
+            if follows:
+                imgui.set_scroll_here_y(1.0)
+        imgui.end_child()
     imgui.end()
     state.messages.is_open = stays
-
-
-def _draw_content(state: AppState) -> None:
-    listed = state.messages.log.listed(state.messages.lists_status)
-    if button(state, "Copy all", "" if listed else "no messages yet"):
-        imgui.set_clipboard_text("\n".join(map(message_line, listed)))
-    explain("copy the messages to the clipboard, one per line")
-    text = "Results of keys and buttons"
-    same_line_if_room(text)
-    state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
-    if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
-        # New messages are appended; the end stays visible unless the user scrolls away.
-        follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
-        if not listed:
-            imgui.text_disabled("no messages yet")
-        for message in listed:
-            _draw_message(message)
-        if follows:
-            imgui.set_scroll_here_y(1.0)
-    imgui.end_child()
-
-
-def _draw_message(message: Message) -> None:
-    is_error = message.kind == "error"
-    if is_error:
-        imgui.push_style_color(imgui.Col_.text, ink(ERROR))
-    imgui.text_wrapped(printable(message_line(message), _LONGEST))
-    if is_error:
-        imgui.pop_style_color()
 
 
 def _draw_error(state: AppState) -> None:
@@ -140,12 +126,7 @@ def _draw_error(state: AppState) -> None:
     state.messages.log_error(state.error)
     if not state.error:
         return
-    imgui.open_popup(_ERROR_TITLE)
-    center = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
-    width = min(560.0, 0.92 * imgui.get_main_viewport().size.x)
-    imgui.set_next_window_size((width, 0.0))
-    opened, stays = imgui.begin_popup_modal(_ERROR_TITLE, True, imgui.WindowFlags_.no_resize)
+    opened, stays = begin_dialog("Error", 560.0)
     if opened:
         imgui.text_wrapped(printable(state.error, 1000))
         if button(state, "OK"):

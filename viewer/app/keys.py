@@ -66,7 +66,10 @@ def handle_keys(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
     """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
     keyboard = state.of(Keyboard)
     had_menu, keyboard.has_menu = keyboard.has_menu, _has_menu()
-    _let_menus_have_keys(keyboard.has_menu)
+    # The arrow keys move through an open menu or list; without one, they step through frames, and
+    # ImGui must not move the focus with them.
+    io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
+    io.config_flags = io.config_flags | flag if keyboard.has_menu else io.config_flags & ~flag
     # Ctrl may be released in the frame in which the letter is pressed. Modifiers held in the
     # previous frame still count, or Ctrl+S would be interpreted as S.
     now = imgui.get_io().key_mods
@@ -107,12 +110,6 @@ def _bound(shortcuts: Sequence[Shortcut], chosen: Mapping[str, str]) -> dict[int
             key = imgui.Key(chord & ~mask)
             bound.setdefault(chord & mask, []).append((key, key in _REPEATED, shortcut))
     return bound
-
-
-def _let_menus_have_keys(has_menu: bool) -> None:
-    """Let the arrow keys move through an open menu or list; without one, they step frames."""
-    io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
-    io.config_flags = io.config_flags | flag if has_menu else io.config_flags & ~flag
 
 
 def _has_menu() -> bool:

@@ -179,26 +179,6 @@ def draw_dock(state: AppState) -> int:
     """Draw the dock space and return it; arrange the panels unless the user has done so."""
     shown, layout = state.of(ShownPanels), state.of(Layout)
     dock = imgui.get_id(_DOCK)
-    sizes = _wanted(state)
-    if imgui.internal.dock_builder_get_node(dock) is None or shown.wants_reset:
-        if shown.wants_reset:
-            shown.closed.clear()
-            shown.opened.clear()
-        shown.wants_reset = layout.is_arranged = False
-        _build(layout, dock, sizes)
-    elif not layout.is_arranged and layout.sizes != sizes:
-        is_same = layout.sizes is not None and _shape(layout.sizes) == _shape(sizes)
-        _resize(layout, sizes) if is_same else _rebuild(layout, dock, sizes)
-    else:
-        _notice(layout)
-    _scroll_tabs()
-    flags = imgui.DockNodeFlags_.passthru_central_node
-    flags |= imgui.DockNodeFlags_.no_docking_over_central_node
-    imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
-    return dock
-
-
-def _wanted(state: AppState) -> _Sizes:
     size, style = imgui.get_main_viewport().size, imgui.get_style()
     letter = imgui.get_font_size()
     tracks = sum(actor.clip is not None for actor in state.scene.actors)
@@ -206,12 +186,44 @@ def _wanted(state: AppState) -> _Sizes:
     rows = 3.0 * imgui.get_frame_height_with_spacing() + 2.0 * style.window_padding.y
     rows += (tracks + 1.5) * imgui.get_text_line_height_with_spacing()
     plots = any(_is_in_front(PANELS[name].title) for name in ("curves", "joint_match"))
-    return _default_sizes((size.x, size.y), letter, rows / letter, plots)
-
-
-def _shape(sizes: _Sizes) -> tuple[bool, int]:
-    """Return a key that differs between arrangements with different dock nodes."""
-    return sizes.left > 0.0, sizes.rows
+    sizes = _default_sizes((size.x, size.y), letter, rows / letter, plots)
+    if imgui.internal.dock_builder_get_node(dock) is None or shown.wants_reset:
+        if shown.wants_reset:
+            shown.closed.clear()
+            shown.opened.clear()
+        shown.wants_reset = layout.is_arranged = False
+        _build(layout, dock, sizes)
+    elif not layout.is_arranged and layout.sizes != sizes:
+        old = layout.sizes
+        # Other rows or sides have other dock nodes.
+        if old is not None and (old.left > 0.0, old.rows) == (sizes.left > 0.0, sizes.rows):
+            _resize(layout, sizes)
+        else:
+            front = _in_front()
+            _build(layout, dock, sizes)
+            layout.fronts += front
+    else:
+        # The user has arranged the panels once a panel or an edge is dragged.
+        nodes = map(imgui.internal.dock_builder_get_node, layout.nodes.values())
+        ends = [node.size_ref for node in nodes if node is not None]
+        found = (
+            *((title, imgui.internal.find_window_by_name(title).dock_id) for title in _docked()),
+            *((round(end.x), round(end.y)) for end in ends),
+        )
+        left = imgui.MouseButton_.left
+        drags = imgui.is_mouse_dragging(left) or imgui.is_mouse_released(left)
+        if layout.found and drags and found != layout.found:
+            layout.is_arranged = True
+        layout.found = found
+    # Tab bars scroll to their targets at once: an idle window draws no animation frames.
+    for title in _docked():
+        node = imgui.internal.find_window_by_name(title).dock_node
+        if node is not None and node.tab_bar is not None:
+            node.tab_bar.scrolling_anim = node.tab_bar.scrolling_target
+    flags = imgui.DockNodeFlags_.passthru_central_node
+    flags |= imgui.DockNodeFlags_.no_docking_over_central_node
+    imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
+    return dock
 
 
 def _build(layout: Layout, dock: int, sizes: _Sizes) -> None:
@@ -251,13 +263,6 @@ def _rows(right: int, sizes: _Sizes) -> dict[str, int]:
         return {"right 1": upper, "right 2": lower, "right 3": lower}
     split = builder.dock_builder_split_node(lower, imgui.Dir.down, 0.4)
     return {"right 1": upper, "right 2": split.id_at_opposite_dir, "right 3": split.id_at_dir}
-
-
-def _rebuild(layout: Layout, dock: int, sizes: _Sizes) -> None:
-    """Rebuild the arrangement, and keep the front tabs in front."""
-    front = _in_front()
-    _build(layout, dock, sizes)
-    layout.fronts += front
 
 
 def toggle_panel(state: AppState, name: str) -> None:
@@ -304,28 +309,6 @@ def _resize(layout: Layout, sizes: _Sizes) -> None:
         high = sizes.bottom if name == "bottom" else found.size.y
         imgui.internal.dock_builder_set_node_size(node, (wide, high))
     layout.sizes, layout.found = sizes, ()
-
-
-def _notice(layout: Layout) -> None:
-    """Detect whether the user drags a panel or an edge."""
-    nodes = map(imgui.internal.dock_builder_get_node, layout.nodes.values())
-    found = (
-        *((title, imgui.internal.find_window_by_name(title).dock_id) for title in _docked()),
-        *((round(node.size_ref.x), round(node.size_ref.y)) for node in nodes if node is not None),
-    )
-    left = imgui.MouseButton_.left
-    drags = imgui.is_mouse_dragging(left) or imgui.is_mouse_released(left)
-    if layout.found and drags and found != layout.found:
-        layout.is_arranged = True
-    layout.found = found
-
-
-def _scroll_tabs() -> None:
-    """Scroll tab bars to their targets immediately: an idle window draws no animation frames."""
-    for title in _docked():
-        node = imgui.internal.find_window_by_name(title).dock_node
-        if node is not None and node.tab_bar is not None:
-            node.tab_bar.scrolling_anim = node.tab_bar.scrolling_target
 
 
 def _docked() -> list[str]:

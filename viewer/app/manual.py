@@ -53,24 +53,20 @@ def draw_manual(state: AppState) -> None:
         return
     shown, stays = begin_window("Manual", _SIZE)
     if shown:
-        _draw_topics(state, manual)
+        # Draw the list of pages, at the left.
+        if imgui.begin_child("##topics", (_TOPICS * imgui.get_font_size(), 0.0)):
+            for topic, text in PAGES.items():
+                if imgui.selectable(f"{topic.capitalize()}##{topic}", topic == manual.topic)[0]:
+                    manual.topic = topic
+                note_item(state, f"page {topic}")
+                if imgui.is_item_hovered():
+                    imgui.set_tooltip(text)
+        imgui.end_child()
         imgui.same_line()
         _draw_page(state, manual)
     imgui.end()
     if not stays:
         manual.topic = ""
-
-
-def _draw_topics(state: AppState, manual: Manual) -> None:
-    """Draw the list of pages, at the left."""
-    if imgui.begin_child("##topics", (_TOPICS * imgui.get_font_size(), 0.0)):
-        for topic, text in PAGES.items():
-            if imgui.selectable(f"{topic.capitalize()}##{topic}", topic == manual.topic)[0]:
-                manual.topic = topic
-            note_item(state, f"page {topic}")
-            if imgui.is_item_hovered():
-                imgui.set_tooltip(text)
-    imgui.end_child()
 
 
 def _draw_page(state: AppState, manual: Manual) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.closing import request_quit
+from viewer.app.core.actions import Action
 from viewer.app.core.reasons import (
     no_job_room,
     no_new_clip,
@@ -20,10 +21,10 @@ from viewer.app.core.state import AppState
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.editing import new_clip
-from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import (
     Files,
     ask_for_files,
+    ask_where_to_write,
     open_bundled_body,
     open_bundled_figure,
     open_files,
@@ -61,7 +62,10 @@ def draw_menus(state: AppState) -> None:
         _draw_file_menu(state)
         imgui.end_menu()
     if begin_menu(state, "Edit"):
-        _draw_edit_menu(state)
+        for number, actions in enumerate(_EDITING):
+            if number:
+                imgui.separator()
+            _draw_items(state, *actions)
         imgui.end_menu()
     draw_view_menu(state)
     if begin_menu(state, "Window"):
@@ -85,8 +89,7 @@ def draw_menus(state: AppState) -> None:
 
 def _draw_file_menu(state: AppState) -> None:
     files = state.of(Files)
-    if menu_item(state, "Open…", "Ctrl+O"):
-        ask_for_files(state)
+    _draw_items(state, Action("Open…", ask_for_files, key="Ctrl+O"))
     if begin_menu(state, "Open recent", bool(files.recent)):
         for number, group in enumerate(files.recent):
             text = printable(" + ".join(opened_text(Path(path)) for path in group), 80)
@@ -96,36 +99,28 @@ def _draw_file_menu(state: AppState) -> None:
             if imgui.is_item_hovered():
                 imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
         imgui.end_menu()
-    if menu_item(state, "Bundled figure"):
-        open_bundled_figure(state)
-    if menu_item(state, "Bundled body"):
-        open_bundled_body(state)
+    _draw_items(state, *_BUNDLED)
     if begin_menu(state, "Models"):
         draw_model_menu(state)
         imgui.end_menu()
     imgui.separator()
-    if menu_item(state, "Save pose…", why=no_pose(state)):
-        ask_for_pose(state)
-    if menu_item(state, "Export…", why=no_job_room(state)):
-        ask_for_export(state)
-    if menu_item(state, "Export motion…", why=nothing_to_export(state) or no_job_room(state)):
-        ask_for_motion(state)
-    if menu_item(state, "Record pictures or video…", why=no_job_room(state)):
-        open_record_dialog(state)
-    if menu_item(state, "Save screenshot", "F12"):
-        want_screenshot(state)
+    _draw_items(state, *_SAVING)
     imgui.separator()
-    if menu_item(state, "Quit", "Ctrl+Q"):
-        request_quit(state)
+    _draw_items(state, Action("Quit", request_quit, key="Ctrl+Q"))
+
+
+def _draw_items(state: AppState, *actions: Action) -> None:
+    for action in actions:
+        if menu_item(state, action.text, action.key, why=action.reason(state)):
+            action.run(state)
 
 
 def ask_for_export(state: AppState) -> None:
     """Ask where to export the chosen actor in its current pose."""
     suffixes = tuple(pose_formats())
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_export(state, paths[0]),
-        "save",
+    ask_where_to_write(
+        state,
+        save_export,
         "Export",
         suffixes,
         f"{file_stem(state.actor.name)}.obj",
@@ -135,30 +130,35 @@ def ask_for_export(state: AppState) -> None:
     )
 
 
-def _draw_edit_menu(state: AppState) -> None:
-    if menu_item(state, "Undo", "Ctrl+Z", why=no_undo(state)):
-        undo(state)
-    if menu_item(state, "Redo", "Ctrl+Shift+Z", why=no_redo(state)):
-        redo(state)
-    imgui.separator()
-    why = no_pose(state)
-    if menu_item(state, "Reset pose", "R"):
-        reset_pose(state)
-    if menu_item(state, "Mirror pose", "M", why=why):
-        mirror(state)
-    if menu_item(state, "New clip", why=no_new_clip(state)):
-        new_clip(state)
-    if menu_item(state, "Copy pose", "Ctrl+C", why=why):
-        copy_pose(state)
-    if menu_item(state, "Copy pose as raw values", "Ctrl+Shift+C", why=why):
-        copy_numbers(state)
-    if menu_item(state, "Paste pose", "Ctrl+V", why=why):
-        paste_pose(state)
-    imgui.separator()
-    if menu_item(state, "Find an action…", "Ctrl+P"):
-        toggle_palette(state)
-    if menu_item(state, "Check the rig", why=no_job_room(state)):
-        check_rig(state)
-    imgui.separator()
-    if menu_item(state, "Preferences…", "Ctrl+,"):
-        open_preferences(state)
+_BUNDLED = (
+    Action("Bundled figure", open_bundled_figure),
+    Action("Bundled body", open_bundled_body),
+)
+_SAVING = (
+    Action("Save pose…", ask_for_pose, no_pose),
+    Action("Export…", ask_for_export, no_job_room),
+    Action(
+        "Export motion…",
+        ask_for_motion,
+        lambda state: nothing_to_export(state) or no_job_room(state),
+    ),
+    Action("Record pictures or video…", open_record_dialog, no_job_room),
+    Action("Save screenshot", want_screenshot, key="F12"),
+)
+_EDITING = (
+    (Action("Undo", undo, no_undo, "Ctrl+Z"), Action("Redo", redo, no_redo, "Ctrl+Shift+Z")),
+    (
+        Action("Reset pose", reset_pose, key="R"),
+        Action("Mirror pose", mirror, no_pose, "M"),
+        Action("New clip", new_clip, no_new_clip),
+        Action("Copy pose", copy_pose, no_pose, "Ctrl+C"),
+        Action("Copy pose as raw values", copy_numbers, no_pose, "Ctrl+Shift+C"),
+        Action("Paste pose", paste_pose, no_pose, "Ctrl+V"),
+    ),
+    (
+        Action("Find an action…", toggle_palette, key="Ctrl+P"),
+        Action("Check the rig", check_rig, no_job_room),
+    ),
+    (Action("Preferences…", open_preferences, key="Ctrl+,"),),
+)
+"""Items of the menus, between their separators."""

@@ -14,7 +14,7 @@ the frame in which its key was pressed, as happens on a slow machine, the shortc
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +70,8 @@ class Shell:
         self._saves_layout = True
         self._typed_keys = TypedKeys()
         self._set_callbacks()
-        self.imgui: Any = imgui.create_context()
-        self.implot: Any = implot.create_context()
+        self.imgui = imgui.create_context()
+        self.implot = implot.create_context()
         self._set_up_imgui(scale)
 
     def _set_callbacks(self) -> None:
@@ -80,20 +80,20 @@ class Shell:
         glfw.set_framebuffer_size_callback(self.handle, self._on_change)
         glfw.set_window_refresh_callback(self.handle, self._on_change)
 
-    def _on_drop(self, _: Any, names: Sequence[str]) -> None:
+    def _on_drop(self, _: object, names: Sequence[str]) -> None:
         self.dropped += map(Path, names)
 
-    def _on_key(self, _: Any, key: int, code: int, action: int, modifiers: int) -> None:
+    def _on_key(self, _: object, key: int, code: int, action: int, modifiers: int) -> None:
         is_typing = imgui.get_io().want_text_input
         if self._typed_keys.passes(key, action, modifiers, is_typing):
             end_frame_before(self.imgui.input_events_queue, key, action)
             imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
-    def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
+    def _on_button(self, _: object, button: int, action: int, modifiers: int) -> None:
         end_frame(self.imgui.input_events_queue)
         imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
 
-    def _on_change(self, *_: Any) -> None:
+    def _on_change(self, *_: object) -> None:
         self.is_dirty = True
 
     def _set_up_imgui(self, scale: float | None) -> None:
@@ -219,13 +219,13 @@ def create_context() -> moderngl.Context:
         raise RenderError(explain_failure(str(problem))) from None
 
 
-def end_frame_before(queue: Any, key: int, action: int) -> None:
+def end_frame_before(queue: Sized, key: int, action: int) -> None:
     """Put the events before a modifier's release into a separate frame."""
     if action == _RELEASE and key in _MODIFIERS:
         end_frame(queue)
 
 
-def end_frame(queue: Any) -> None:
+def end_frame(queue: Sized) -> None:
     """Make ImGui process the queued events, if any, in a frame before later ones."""
     # Tabs and other widgets that may overlap react to a press only if they were hovered in an
     # earlier frame, and the last motion of a drag counts only before its release.

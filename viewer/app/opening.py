@@ -57,28 +57,24 @@ def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
     hold()  # exceptions raised in GLFW's callbacks, such as interrupts, would be lost
     shell = Shell(f"{printable(opening.title, 100)} - viewer", scale)
     try:
-        _show_progress(opening, shell)
+        from viewer.app.core.theme import set_theme
+        from viewer.app.display import import_glfw
+        from viewer.app.preferences.applying import chosen_theme
+        from viewer.interrupts import poll
+
+        glfw = import_glfw()
+        set_theme(chosen_theme(shell.preferences, shell.appearance))
+        while not opening.wait(0.0):
+            poll()
+            glfw.wait_events_timeout(_EVERY)
+            if glfw.window_should_close(shell.handle) or _draw(opening, shell):
+                raise Cancelled
     except BaseException:
         opening.cancel()
         shell.release()
         opening.wait(1.0)
         raise
     return shell
-
-
-def _show_progress(opening: Opening[Found], shell: Shell) -> None:
-    from viewer.app.core.theme import set_theme
-    from viewer.app.display import import_glfw
-    from viewer.app.preferences.applying import chosen_theme
-    from viewer.interrupts import poll
-
-    glfw = import_glfw()
-    set_theme(chosen_theme(shell.preferences, shell.appearance))
-    while not opening.wait(0.0):
-        poll()
-        glfw.wait_events_timeout(_EVERY)
-        if glfw.window_should_close(shell.handle) or _draw(opening, shell):
-            raise Cancelled
 
 
 def _draw(opening: Opening[Found], shell: Shell) -> bool:

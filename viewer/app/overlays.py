@@ -35,10 +35,7 @@ _MOST_NOTES = 8
 _LONGEST_NOTE = 400  # maximum length of a message in characters
 _COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
 _OPACITY = 0.97  # text behind the list must not show through
-_KEYS_GAP, _COLUMNS_GAP = (
-    1.5,
-    3.0,
-)  # distances from a key to its text and between columns, in font sizes
+_KEYS_GAP, _COLUMNS_GAP = 1.5, 3.0  # from a key to its text, between columns, in font sizes
 
 
 class _Progress(NamedTuple):
@@ -155,7 +152,11 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     if not state.messages.notes or width <= 40:
         return
     style = imgui.get_style()
-    right, bottom = _notes_corner(state)
+    # Messages end next to the hints, or above them.
+    hint, gizmo, bottom = hint_rect(state), gizmo_rect(state), y + height - _GAP
+    right = min(hint[0], hint[0] if gizmo is None else gizmo[0]) - _BETWEEN
+    if right - x <= _BESIDE * width:
+        right, bottom = x + width - _GAP, hint[1] - _BETWEEN
     wrap = max(right - x - _GAP - 2.0 * style.window_padding.x, 50.0)
     texts = [printable(note.text, _LONGEST_NOTE) for note in state.messages.notes]
     line = imgui.get_text_line_height_with_spacing()
@@ -180,17 +181,6 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
         imgui.pop_text_wrap_pos()
     overlay_rect(state, "##notes")
     imgui.end()
-
-
-def _notes_corner(state: AppState) -> tuple[float, float]:
-    """Return the lower right corner of the area for messages: next to the hints or above them."""
-    x, y, width, height = state.view_rect
-    hint = hint_rect(state)
-    gizmo = gizmo_rect(state)
-    right = min(hint[0], hint[0] if gizmo is None else gizmo[0]) - _BETWEEN
-    if right - x > _BESIDE * width:
-        return right, y + height - _GAP
-    return x + width - _GAP, hint[1] - _BETWEEN
 
 
 def n_newest(heights: Sequence[float], line: float, room: float) -> int:
@@ -225,7 +215,15 @@ def _draw_keys(state: AppState) -> None:
     edges = 2.0 * style.window_padding.x, 2.0 * style.window_padding.y
     imgui.set_next_window_size_constraints((0.0, 0.0), (room[0] + edges[0], room[1] + edges[1]))
     imgui.set_next_window_bg_alpha(_OPACITY)
-    if imgui.begin("##keys", None, _flags(columns.fits))[0]:
+    flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
+    flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
+    if columns.fits:
+        flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_scrollbar
+    else:  # only a window that scrolls accepts input
+        flags |= imgui.WindowFlags_.horizontal_scrollbar
+    if imgui.begin("##keys", None, flags)[0]:
         left, top = imgui.get_cursor_pos()
         step = imgui.get_text_line_height_with_spacing()
         for index, (label, text) in enumerate(lines):
@@ -237,17 +235,6 @@ def _draw_keys(state: AppState) -> None:
             imgui.text_unformatted(text)
     overlay_rect(state, "##keys")
     imgui.end()
-
-
-def _flags(fits: bool) -> int:
-    """Return the flags of a window that accepts input only if it scrolls."""
-    flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
-    flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
-    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    flags |= imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
-    if fits:
-        return flags | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_scrollbar
-    return flags | imgui.WindowFlags_.horizontal_scrollbar
 
 
 def column_layout(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:

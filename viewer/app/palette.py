@@ -1,4 +1,8 @@
-"""Window of the command palette: a text box, and the entries that match it."""
+"""Window of the command palette: a text box, and the entries that match it.
+
+The palette of imgui-bundle matches the letters of a query in order, so it does not find "Front
+view" for "view front", or left_knee for "knee left"; it shows neither kinds, keys nor reasons.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import ink
-from viewer.app.core.widgets import note_item, overlay_rect
+from viewer.app.core.widgets import note_item, overlay_rect, visible_rows
 from viewer.data_classes import dataclass
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
@@ -83,17 +87,13 @@ def draw_palette(state: AppState, entries: Callable[[AppState], list[Entry]]) ->
     overlay_rect(state, "##palette")
     is_left = palette.has_focus and not imgui.is_window_focused(imgui.FocusedFlags_.child_windows)
     imgui.end()
-    if is_left or _is_closed():
+    # Letters go to the text box, but not the keys that close the palette.
+    is_closed = imgui.get_io().key_ctrl and imgui.is_key_pressed(_K.p, False)
+    if is_left or is_closed or imgui.is_key_pressed(_K.escape, False):
         state.put(Palette())
     elif chosen is not None and not chosen.why:
         state.put(Palette())
         chosen.run(state)
-
-
-def _is_closed() -> bool:
-    """Return whether a key closes the palette; letters go to its text box."""
-    is_again = imgui.get_io().key_ctrl and imgui.is_key_pressed(_K.p, False)
-    return is_again or imgui.is_key_pressed(_K.escape, False)
 
 
 def _draw_content(state: AppState, palette: Palette) -> Entry | None:
@@ -106,7 +106,12 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
     palette.query = imgui.input_text_with_hint("##query", hint, palette.query)[1]
     note_item(state, "palette query")
     if not palette.has_focus:
-        _keep_early_letters(palette, letters)
+        # Letters may be typed before the text box accepts input, as on a slow machine.
+        palette.query += letters
+        editing = imgui.internal.get_input_text_state(imgui.get_item_id())
+        if imgui.is_item_activated() and editing is not None:
+            # The text box discards the letters of the frame in which it gets the focus.
+            editing.reload_user_buf_and_move_to_end()
     palette.has_focus |= imgui.is_item_active()
     if palette.query != palette.matched:
         palette.shown = ranked(palette.query, [entry.text for entry in palette.known])
@@ -116,15 +121,6 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
     if imgui.is_key_pressed(_K.enter, False) or imgui.is_key_pressed(_K.keypad_enter, False):
         return palette.known[palette.shown[palette.row]] if palette.shown else None
     return chosen
-
-
-def _keep_early_letters(palette: Palette, letters: str) -> None:
-    """Add letters typed before the text box accepts input, as happens on a slow machine."""
-    palette.query += letters
-    editing = imgui.internal.get_input_text_state(imgui.get_item_id())
-    if imgui.is_item_activated() and editing is not None:
-        # The text box discards the letters of the frame in which it gets the focus.
-        editing.reload_user_buf_and_move_to_end()
 
 
 def _move(palette: Palette) -> bool:
@@ -148,25 +144,18 @@ def _draw_rows(state: AppState, palette: Palette, moved: bool) -> Entry | None:
     height = imgui.get_text_line_height_with_spacing()
     if imgui.begin_child("##rows", (0.0, min(count, _ROWS) * height + 4.0)):
         if moved:
-            _reveal(palette.row * height, height)
-        clipper = imgui.ListClipper()
-        clipper.begin(count, height)
-        while clipper.step():
-            for row in range(clipper.display_start, clipper.display_end):
-                entry = palette.known[palette.shown[row]]
-                if _draw_row(state, entry, row, row == palette.row):
-                    chosen = entry
+            top = palette.row * height
+            first, room = imgui.get_scroll_y(), imgui.get_window_height()
+            if top < first:
+                imgui.set_scroll_y(top)
+            elif top + height > first + room:
+                imgui.set_scroll_y(top + height - room)
+        for row in visible_rows(count, height):
+            entry = palette.known[palette.shown[row]]
+            if _draw_row(state, entry, row, row == palette.row):
+                chosen = entry
     imgui.end_child()
     return chosen
-
-
-def _reveal(top: float, height: float) -> None:
-    """Scroll to make a row visible."""
-    first, room = imgui.get_scroll_y(), imgui.get_window_height()
-    if top < first:
-        imgui.set_scroll_y(top)
-    elif top + height > first + room:
-        imgui.set_scroll_y(top + height - room)
 
 
 def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
@@ -215,11 +204,7 @@ def _score_word(word: str, name: str) -> float:
         place = following
     if place >= 0:
         return _START - min(place, 20)
-    return _score_letters(word, name)
-
-
-def _score_letters(word: str, name: str) -> float:
-    """Return the score of a sequence of letters; starts of words and runs count more."""
+    # Scattered letters: starts of words and runs count more.
     points = _walk(word, name, True)
     points = _walk(word, name, False) if points < 0 else points
     return -1.0 if points < 0 else _SCATTERED * points / (2.0 * len(word))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from viewer.app.display import find_display, import_glfw
 from viewer.app.files.files import Files, open_files, stream_captures
@@ -259,7 +258,7 @@ class Rest:
         self.left = _SETTLE_FRAMES if happened or is_over else self.left - 1
 
 
-def awaits_tooltip(context: Any) -> bool:
+def awaits_tooltip(context: imgui.internal.Context) -> bool:
     """Return whether the mouse is over an item whose delayed tooltip has not appeared yet."""
     delay = imgui.get_style().hover_delay_normal
     return context.hover_item_delay_id != 0 and context.hover_item_delay_timer < delay

@@ -11,7 +11,7 @@ from app.playback.test_timeline import capture, finish
 from numpy.testing import assert_allclose
 
 import viewer
-from viewer.app.actors.following import start_following
+from viewer.app.actors.following import toggle_following
 from viewer.app.core.view_frame import ViewFrame, view_frame
 from viewer.app.curves.editing import place_key
 from viewer.app.files.files import Files
@@ -113,7 +113,7 @@ def test_moving_the_camera_ends_the_fit(wide, move):
 
 
 def test_following_ends_the_fit(wide):
-    start_following(wide.state, 0, -1)
+    toggle_following(wide.state, 0, -1)
     before = wide.state.camera.copy()
     wide.key("tab")
     wide.step(2)

@@ -9,7 +9,7 @@ from app.curves.plotted import ARM_X, SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose
 
 import viewer
-from viewer.app.actors.following import start_following
+from viewer.app.actors.following import toggle_following
 from viewer.app.core.undo_actions import undo
 from viewer.app.curves.editing import (
     Curves,
@@ -296,7 +296,7 @@ def test_clip_files_are_loaded_into_the_undoable_state(drive, rig, tmp_path):
 def test_following_camera_moves_with_undo(curves):
     state = curves.state
     go(curves, 0.75)
-    start_following(state, 0, 1)
+    toggle_following(state, 0, 1)
     curves.step(1)
     place, target = followed_point(state.actor, 1), state.camera.target.copy()
     place_key(state, (0, 1), value=3.0)  # the root slides farther
@@ -311,7 +311,7 @@ def test_following_camera_moves_with_undo(curves):
 
 def test_following_camera_does_not_move_while_a_pose_is_edited(curves):
     state = curves.state
-    start_following(state, 0, 1)
+    toggle_following(state, 0, 1)
     curves.step(1)
     target = state.camera.target.copy()
     state.actor.pose.dofs[0] += 0.5

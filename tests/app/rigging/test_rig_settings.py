@@ -213,7 +213,7 @@ def test_target_that_is_already_rigged_is_refused(drive, tmp_path):
     hand = drive(size=SIZE, samples=1)
     body = viewer.load(*write_rig(tmp_path)).actors[0]
     save(body.figure, tmp_path / "whole.npz")
-    start_adding(hand.state, tmp_path / "whole.npz")
+    start_adding(hand.state, [tmp_path / "whole.npz"])
     hand.finish_job()
     assert hand.state.error == (
         f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found a rigged mesh"
@@ -224,7 +224,7 @@ def test_mesh_of_a_gltf_file_without_a_skin_is_rigged_in_its_current_pose(drive,
     figure, pose = rig_scene.bent()
     export(Actor(rig_scene.scan(figure, pose)), tmp_path / "scan.glb")
     hand = drive(scene=Scene([Actor(figure, pose)]), size=SIZE, samples=1)
-    start_adding(hand.state, tmp_path / "scan.glb")
+    start_adding(hand.state, [tmp_path / "scan.glb"])
     hand.finish_job()
     assert hand.state.error == ""
     hand.menu("menu Window", "Rig")
@@ -249,7 +249,7 @@ def test_mesh_and_template_are_added_in_the_unit_and_up_axis_of_the_scene(drive,
     mesh = replace(scan, name="other", unit="m", up="y")
     export(Actor(mesh), tmp_path / "other.obj")
     save(replace(figure, unit="mm", up="y"), tmp_path / "arm.npz")
-    start_adding(hand.state, tmp_path / "other.obj")
+    start_adding(hand.state, [tmp_path / "other.obj"])
     hand.finish_job()
     assert hand.state.error == ""
     added = hand.state.scene.actors[1]

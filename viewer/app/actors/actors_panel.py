@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.actors.following import Following, stop_following, toggle_following
 from viewer.app.core.camera_moves import look_through_view
 from viewer.app.core.fields import begin_field, drag_float, in_row
 from viewer.app.core.state import AppState
@@ -16,6 +16,7 @@ from viewer.app.core.widgets import (
     note_item,
     plain_zero,
     same_line_if_room,
+    visible_rows,
 )
 from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
 from viewer.errors import ViewerError
@@ -39,54 +40,6 @@ def draw(state: AppState) -> None:
     _draw_space(state)
     actor = state.actor
     imgui.separator()
-    _draw_place(state, actor)
-    _draw_springs(state, actor)
-    _draw_feet(state, actor)
-    _draw_following(state)
-    _draw_motion_paths(state, actor)
-    _draw_fit(state, actor)
-
-
-def _draw_list(state: AppState) -> None:
-    actors = state.scene.actors
-    rows = min(len(actors), 8)
-    height = rows * imgui.get_frame_height_with_spacing() + 4.0
-    if imgui.begin_child("##list", (0.0, height)):
-        clipper = imgui.ListClipper()
-        clipper.begin(len(actors), imgui.get_frame_height_with_spacing())
-        while clipper.step():
-            for index in range(clipper.display_start, clipper.display_end):
-                imgui.push_id(index)
-                _draw_actor(state, index, actors[index])
-                imgui.pop_id()
-    imgui.end_child()
-
-
-def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
-    actor.visible = imgui.checkbox("##visible", actor.visible)[1]
-    note_item(state, f"visible {index}")
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("show or hide this actor")
-    imgui.same_line()
-    shown = actor.color or _PLAIN
-    changed, color = imgui.color_edit3("##color", list(shown), _LOOK)
-    note_item(state, f"color {index}")
-    if imgui.is_item_clicked(imgui.MouseButton_.right):
-        actor.color = None
-    elif changed:
-        actor.color = (color[0], color[1], color[2])
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("colour; right-click to restore the default")
-    imgui.same_line()
-    absent = "" if actor.is_present else "  (absent)"
-    text = f"{printable(actor.name, 60)}{absent}"
-    if imgui.selectable(text, index == state.chosen_actor)[0]:
-        state.select_actor(index)
-    note_item(state, f"actor {index}")
-
-
-def _draw_place(state: AppState, actor: Actor) -> None:
-    """Draw the start time and position of the chosen actor."""
     if actor.clip is not None:
         shown = plain_zero(actor.offset, "%.3f s")
         changed, value = drag_float(state, begin_field("Start time"), shown, 0.01, "%.3f s")
@@ -106,6 +59,53 @@ def _draw_place(state: AppState, actor: Actor) -> None:
 
     in_row(begin_field("Position"), range(3), draw_axis)
     note_item(state, "Position")
+    _draw_springs(state, actor)
+    _draw_feet(state, actor)
+    imgui.align_text_to_frame_padding()
+    imgui.text_unformatted("Camera follows")
+    for text, joint in (("Actor", -1), ("Joint", state.selected_joint)):
+        if text == "Joint" and joint < 0:
+            continue
+        same_line_if_room(text)
+        is_on = state.of(Following).target == (state.chosen_actor, joint)
+        if checkbox(state, f"{text}##follow", is_on) != is_on:
+            toggle_following(state, state.chosen_actor, joint)
+    if state.of(Following).target is not None:
+        same_line_if_room("None")
+        if button(state, "None"):
+            stop_following(state)
+    _draw_motion_paths(state, actor)
+    _draw_fit(state, actor)
+
+
+def _draw_list(state: AppState) -> None:
+    actors = state.scene.actors
+    rows = min(len(actors), 8)
+    height = rows * imgui.get_frame_height_with_spacing() + 4.0
+    if imgui.begin_child("##list", (0.0, height)):
+        for index in visible_rows(len(actors), imgui.get_frame_height_with_spacing()):
+            imgui.push_id(index)
+            actor = actors[index]
+            actor.visible = imgui.checkbox("##visible", actor.visible)[1]
+            note_item(state, f"visible {index}")
+            explain("show or hide this actor")
+            imgui.same_line()
+            shown = actor.color or _PLAIN
+            changed, color = imgui.color_edit3("##color", list(shown), _LOOK)
+            note_item(state, f"color {index}")
+            if imgui.is_item_clicked(imgui.MouseButton_.right):
+                actor.color = None
+            elif changed:
+                actor.color = (color[0], color[1], color[2])
+            explain("colour; right-click to restore the default")
+            imgui.same_line()
+            absent = "" if actor.is_present else "  (absent)"
+            text = f"{printable(actor.name, 60)}{absent}"
+            if imgui.selectable(text, index == state.chosen_actor)[0]:
+                state.select_actor(index)
+            note_item(state, f"actor {index}")
+            imgui.pop_id()
+    imgui.end_child()
 
 
 def _draw_springs(state: AppState, actor: Actor) -> None:
@@ -125,31 +125,10 @@ def _draw_feet(state: AppState, actor: Actor) -> None:
     why, is_on = no_edit(state), plants_feet(state)
     if checkbox(state, "Feet on the ground", is_on, why) != is_on:
         toggle_feet(state)
-    if not why:
-        explain(
-            "keep feet in place, with their soles on the ground, while the feet of the source "
-            "motion do not move"
-        )
-
-
-def _draw_following(state: AppState) -> None:
-    """Draw the choice of the camera's target: the chosen actor, its selected joint or none."""
-    imgui.align_text_to_frame_padding()
-    imgui.text_unformatted("Camera follows")
-    same_line_if_room("Actor")
-    target = state.of(Following).target
-    index, joint = state.chosen_actor, state.selected_joint
-    if checkbox(state, "Actor##follow", target == (index, -1)) != (target == (index, -1)):
-        stop_following(state) if target == (index, -1) else start_following(state, index, -1)
-    if joint >= 0:
-        same_line_if_room("Joint")
-        if checkbox(state, "Joint##follow", target == (index, joint)) != (target == (index, joint)):
-            chosen = target == (index, joint)
-            stop_following(state) if chosen else start_following(state, index, joint)
-    if target is not None:
-        same_line_if_room("None")
-        if button(state, "None"):
-            stop_following(state)
+    explain(
+        "keep feet in place, with their soles on the ground, while the feet of the source "
+        "motion do not move"
+    )
 
 
 def _draw_motion_paths(state: AppState, actor: Actor) -> None:

@@ -39,9 +39,12 @@ def follow_actor(state: AppState) -> None:
         following.place = place
 
 
-def start_following(state: AppState, actor: int, joint: int) -> None:
-    """Let the camera follow an actor's joint, or its centre (-1), from the current viewpoint."""
+def toggle_following(state: AppState, actor: int, joint: int) -> None:
+    """Let the camera follow an actor's joint, or its centre (-1), from here; or stop following."""
     following = state.of(Following)
+    if following.target == (actor, joint):
+        stop_following(state)
+        return
     state.framing.is_fitting = False
     following.target = actor, joint
     following.place = followed_point(state.scene.actors[actor], joint)

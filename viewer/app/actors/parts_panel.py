@@ -5,7 +5,14 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, note_item, same_line_if_room
+from viewer.app.core.widgets import (
+    button,
+    explain,
+    menu_item,
+    note_item,
+    same_line_if_room,
+    visible_rows,
+)
 from viewer.phrases import printable
 from viewer.rig.scene import Actor
 
@@ -24,33 +31,24 @@ def draw(state: AppState) -> None:
         actor.hidden_parts = frozenset(range(count)) - actor.hidden_parts
     imgui.same_line()
     imgui.text_disabled(f"{count - hidden} of {count} shown" if hidden else f"{count} parts")
-    clipper = imgui.ListClipper()
-    clipper.begin(count, imgui.get_frame_height_with_spacing())
-    while clipper.step():
-        for part in range(clipper.display_start, clipper.display_end):
-            _draw_part(state, actor, part)
-
-
-def _draw_part(state: AppState, actor: Actor, part: int) -> None:
-    """Draw the check box of one part; a right-click opens a menu."""
-    imgui.push_id(part)
-    shown = part not in actor.hidden_parts
-    label = printable(part_label(actor, part), _LONGEST)
-    changed, wanted = imgui.checkbox(label, shown)
-    note_item(state, f"part {part}")
-    if changed:
-        set_part_shown(actor, part, wanted)
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("show or hide this part; right-click for more")
-    if imgui.begin_popup_context_item("part menu"):
-        if imgui.menu_item("Show only this part", "", False)[0]:
-            isolate_part(actor, part)
-        note_item(state, "Show only this part")
-        if imgui.menu_item("Show all parts", "", False, bool(actor.hidden_parts))[0]:
-            show_all_parts(state)
-        note_item(state, "Show all parts")
-        imgui.end_popup()
-    imgui.pop_id()
+    for part in visible_rows(count, imgui.get_frame_height_with_spacing()):
+        # Draw the check box of one part; a right-click opens a menu.
+        imgui.push_id(part)
+        shown = part not in actor.hidden_parts
+        label = printable(part_label(actor, part), _LONGEST)
+        changed, wanted = imgui.checkbox(label, shown)
+        note_item(state, f"part {part}")
+        if changed:
+            set_part_shown(actor, part, wanted)
+        explain("show or hide this part; right-click for more")
+        if imgui.begin_popup_context_item("part menu"):
+            if menu_item(state, "Show only this part"):
+                isolate_part(actor, part)
+            why = "" if actor.hidden_parts else "no part is hidden"
+            if menu_item(state, "Show all parts", why=why):
+                show_all_parts(state)
+            imgui.end_popup()
+        imgui.pop_id()
 
 
 def part_label(actor: Actor, part: int) -> str:

@@ -46,7 +46,7 @@ class Shortcut:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """An action without a key, for the command palette."""
+    """An action of a menu or the command palette."""
 
     text: str
     """Name of the action."""
@@ -54,3 +54,5 @@ class Action:
     """The action."""
     reason: Callable[[AppState], str] = lambda state: ""
     """Returns the reason why the action is disabled; empty if it can be run."""
+    key: str = ""
+    """Label of its key in the table of keys; empty for none."""

@@ -47,7 +47,10 @@ def no_parts(state: AppState) -> str:
 
 def no_pose(state: AppState) -> str:
     """Return the reason why the chosen actor cannot be posed."""
-    return "" if state.actor.pose is not None else f"{_subject(state)} has no joints to pose"
+    if state.actor.pose is not None:
+        return ""
+    is_captured = state.actor.figure.points is not None
+    return f"{'a set of captured points' if is_captured else 'this figure'} has no joints to pose"
 
 
 def no_new_clip(state: AppState) -> str:
@@ -107,7 +110,3 @@ def no_texture(state: AppState) -> str:
         for mesh in meshes
     )
     return "" if has_one else "no figure in the scene has a texture: drop a picture on the window"
-
-
-def _subject(state: AppState) -> str:
-    return "a set of captured points" if state.actor.figure.points is not None else "this figure"

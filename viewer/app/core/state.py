@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -99,7 +99,7 @@ class AppState:
     """Advances the scene's time, and poses the actors for it."""
     job: Job | None = None
     """Job that runs in the background or between frames."""
-    _parts: dict[type[Any], Any] = field(default_factory=dict)
+    _parts: dict[type[object], object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._begin()
@@ -107,7 +107,7 @@ class AppState:
     def of(self, kind: type[Part]) -> Part:
         """Return a feature's own state, created on first use from the defaults of its dataclass."""
         part = self._parts.get(kind)
-        if part is None:
+        if not isinstance(part, kind):
             part = self._parts[kind] = kind()
         return part
 

@@ -17,7 +17,7 @@ from pathlib import PurePath
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.theme import WARNING, ink
+from viewer.app.core.theme import WARNING, text_color
 from viewer.phrases import printable
 
 _FLAGS = imgui.InputTextFlags_
@@ -82,12 +82,15 @@ def number_field(
     """
     unit = unit_of(text)
     wrong = _mistake(hidden, unit)
+    shown = text % value if _FORMAT.search(text) else text  # or a word for a special value
+    with text_color(WARNING if wrong else None):
+        typed = imgui.input_text(hidden, shown, _FLAGS.auto_select_all)[1]
     if wrong:
-        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-    typed = imgui.input_text(hidden, _number_with_unit(text, value), _FLAGS.auto_select_all)[1]
-    if wrong:
-        imgui.pop_style_color()
-        _show_below(wrong)
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        imgui.set_next_window_pos((low.x, high.y + imgui.get_style().item_spacing.y))
+        imgui.begin_tooltip()
+        imgui.text_unformatted(wrong)
+        imgui.end_tooltip()
     if not imgui.is_item_deactivated_after_edit() or imgui.is_key_pressed(imgui.Key.escape, False):
         return None
     if not typed.strip():
@@ -129,15 +132,6 @@ def _mistake(hidden: str, unit: str) -> str:
     return ""
 
 
-def _show_below(text: str) -> None:
-    """Show a message below the item drawn last."""
-    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    imgui.set_next_window_pos((low.x, high.y + imgui.get_style().item_spacing.y))
-    imgui.begin_tooltip()
-    imgui.text_unformatted(text)
-    imgui.end_tooltip()
-
-
 def unit_of(text: str) -> str:
     """Return the unit in the format of a field.
 
@@ -146,15 +140,6 @@ def unit_of(text: str) -> str:
     """
     _, *after = _FORMAT.split(text)
     return after[-1].replace("%%", "%").strip() if after else ""
-
-
-def _number_with_unit(text: str, value: float) -> str:
-    """Return a number in the format of a field, which may be a word for a special value.
-
-    >>> _number_with_unit("%.1f s", 2.0), _number_with_unit("no limit", 0.0)
-    ('2.0 s', 'no limit')
-    """
-    return text % value if _FORMAT.search(text) else text
 
 
 def read_number(text: str, unit: str = "") -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import contextlib
+from collections.abc import Iterable, Iterator
 
 from imgui_bundle import imgui
 
@@ -123,6 +124,16 @@ def ink(color: Color) -> Color:
         return color
     red, green, blue, alpha = color
     return _DARKER * red, _DARKER * green, _DARKER * blue, alpha
+
+
+@contextlib.contextmanager
+def text_color(color: Color | None) -> Iterator[None]:
+    """Draw the texts of a block in a colour chosen for dark panels; None keeps the usual one."""
+    if color is not None:
+        imgui.push_style_color(imgui.Col_.text, ink(color))
+    yield
+    if color is not None:
+        imgui.pop_style_color()
 
 
 def accent() -> Color:

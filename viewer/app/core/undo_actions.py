@@ -2,45 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from viewer.app.core.state import AppState
-from viewer.rig.scene import Actor
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.scene import Scene
+
+_Step = Callable[[Scene, DisplayOptions, Callable[[float], None]], bool]
+"""``History.undo`` or ``redo``."""
 
 
 def undo(state: AppState) -> None:
     """Cancel the change that is being computed, or undo the last change of pose or display."""
-    if _cancels_change(state):
+    job = state.job
+    if job is not None and job.is_change and not job.is_cancelled:
+        # Its result would override an earlier change that is undone meanwhile.
+        job.cancel()
         state.say_status("Cancelled")
         return
-    before = state.actor
-    pose_at = partial(state.clock.go_back, chosen=before)
-    is_undone = state.history.undo(state.scene, state.options, pose_at)
-    # Replaces the message about the change, which would be wrong now.
-    state.say_status("Undone" if is_undone else "Nothing to undo")
-    _keep_choice(state, before)
+    _go(state, state.history.undo, "Undone", "Nothing to undo")
 
 
 def redo(state: AppState) -> None:
     """Redo the most recently undone change."""
+    _go(state, state.history.redo, "Redone", "Nothing to redo")
+
+
+def _go(state: AppState, step: _Step, done: str, none: str) -> None:
+    """Take a step; keep the chosen actor at its new index, or choose another if it is gone."""
     before = state.actor
-    pose_at = partial(state.clock.go_back, chosen=before)
-    is_redone = state.history.redo(state.scene, state.options, pose_at)
-    state.say_status("Redone" if is_redone else "Nothing to redo")
-    _keep_choice(state, before)
-
-
-def _cancels_change(state: AppState) -> bool:
-    """Cancel a job whose result would override an earlier change that is undone; say if so."""
-    job = state.job
-    if job is None or not job.is_change or job.is_cancelled:
-        return False
-    job.cancel()
-    return True
-
-
-def _keep_choice(state: AppState, before: Actor) -> None:
-    """Keep the chosen actor at its new index, or choose another if it is gone."""
+    is_done = step(state.scene, state.options, partial(state.clock.go_back, chosen=before))
+    # Replaces the message about the change, which would be wrong now.
+    state.say_status(done if is_done else none)
     actors, row = state.scene.actors, state.chosen_actor
     if row < len(actors) and actors[row] is before:
         return

@@ -5,16 +5,20 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import field, fields
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import field
+from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import WARNING, text_color
 from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 # Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
@@ -76,6 +80,45 @@ def show_tooltip(text: str) -> None:
         imgui.set_tooltip(text)
 
 
+def warning(text: str) -> None:
+    """Draw a wrapped text in the colour of warnings."""
+    with text_color(WARNING):
+        imgui.text_wrapped(text)
+
+
+def is_reset(text: str) -> bool:
+    """Give the last widget a tooltip; return whether a double click resets the widget."""
+    if not imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        return False
+    show_tooltip(text)
+    return imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
+
+
+def visible_rows(count: int, height: float = -1.0, wanted: int = -1) -> Iterator[int]:
+    """Yield the rows of a long list that are in view, and a wanted one, to scroll to it."""
+    clipper = imgui.ListClipper()
+    clipper.begin(count, height)
+    if wanted >= 0:
+        clipper.include_item_by_index(wanted)
+    while clipper.step():
+        yield from range(clipper.display_start, clipper.display_end)
+
+
+def begin_dialog(title: str, width: float, name: str = "") -> tuple[bool, bool]:
+    """Begin a dialog above everything else, of a width in window coordinates.
+
+    ``name``: what identifies it if its title changes. Returns whether it is drawn, in which case
+    ``imgui.end_popup`` must follow, and False once the user closes it.
+    """
+    title = f"{title}###{name}" if name else title
+    imgui.open_popup(title)
+    viewport = imgui.get_main_viewport()
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, (0.5, 0.5))
+    imgui.set_next_window_size((min(width, 0.92 * viewport.size.x), 0.0))
+    opened, stays = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
+    return opened, bool(stays)
+
+
 def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
     """Begin a small window over the view that takes no input; ``imgui.end`` must follow."""
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
@@ -130,14 +173,6 @@ def slider(
     return moved if changed and math.isfinite(moved) else value
 
 
-def setting_slider(state: AppState, label: str, settings: Any, name: str) -> None:
-    """Draw a slider for a setting between the limits that its field states."""
-    low, high = next(each for each in fields(settings) if each.name == name).metadata["limits"]
-    clamp = imgui.SliderFlags_.always_clamp
-    moved = slider(state, label, getattr(settings, name), low, high, flags=clamp)
-    setattr(settings, name, moved)
-
-
 def count_slider(
     state: AppState,
     label: str,
@@ -168,6 +203,17 @@ def button(state: AppState, label: str, why: str = "") -> bool:
         note_item(state, label)
         explain("", why)
     return pressed and not why
+
+
+def radio(
+    state: AppState, label: str, is_on: bool, name: str = "", text: str = "", why: str = ""
+) -> bool:
+    """Draw a radio button, recorded under a name; return whether it was pressed."""
+    with disabled(state, why):
+        pressed = imgui.radio_button(label, is_on)
+        note_item(state, name or label)
+        explain(text, why)
+    return pressed
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
@@ -210,10 +256,50 @@ def choice(
     return keys[chosen] if changed else value
 
 
+def draw_setting(
+    state: AppState,
+    label: str,
+    settings: DataclassInstance,
+    name: str,
+    text: str = "",
+    why: str = "",
+) -> None:
+    """Draw a setting by what its field states: its choices, or its ends, unit and scale.
+
+    ``text``: effect, as a tooltip. ``why``: reason why it is disabled.
+    """
+    facts, value = settings.__dataclass_fields__[name].metadata, getattr(settings, name)
+    with disabled(state, why):
+        if isinstance(value, bool):
+            new: object = checkbox(state, label, value, why)
+        elif "choices" in facts:
+            new = choice(state, label, value, facts["choices"])
+        elif isinstance(value, int):
+            clamp = imgui.SliderFlags_.always_clamp
+            new = count_slider(state, label, value, facts["limits"], flags=clamp)
+        else:
+            flags = imgui.SliderFlags_.always_clamp
+            if facts.get("logarithmic"):
+                flags |= imgui.SliderFlags_.logarithmic
+            low, high = facts["limits"]
+            new = slider(state, label, value, low, high, facts.get("unit", "%.2f"), flags)
+        explain(text, why)
+    setattr(settings, name, new)
+
+
 def _combo_width(texts: Iterable[str]) -> float:
     """Return the width at which a drop-down list clips none of its labels."""
     widest = max((imgui.calc_text_size(text).x for text in texts), default=0.0)
     return widest + imgui.get_frame_height() + 2.0 * imgui.get_style().frame_padding.x
+
+
+def swatch(color: Sequence[float]) -> None:
+    """Draw a square in a colour (r, g, b), sRGB from 0 to 1, at the beginning of a line."""
+    place, side = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
+    ink = imgui.get_color_u32((color[0], color[1], color[2], 1.0))
+    imgui.get_window_draw_list().add_rect_filled(place, (place.x + side, place.y + side), ink)
+    imgui.dummy((side, side))
+    imgui.same_line()
 
 
 def plain_zero(value: float, text: str) -> float:

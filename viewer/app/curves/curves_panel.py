@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 from imgui_bundle import imgui
 
@@ -16,12 +17,12 @@ from viewer.app.core.widgets import (
     note_item,
     plain_zero,
     same_line_if_room,
+    visible_rows,
 )
 from viewer.app.curves.data import Curve, channel_of, curves_of
 from viewer.app.curves.editing import (
     Curves,
     DofKeys,
-    KeyPlace,
     TransformKeys,
     add_key_at,
     ask_for_clip,
@@ -40,8 +41,8 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.files.files import offer_files
-from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, slopes
-from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, slopes
+from viewer.rig.motion.transform_clip import INTERPOLATIONS
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
@@ -63,7 +64,22 @@ def draw(state: AppState) -> None:
             same_line_if_room("Open files…")
         offer_files(state, "" if can_have_keys(state) else "This figure has no motion.")
         return
-    _follow(state, curves)
+    # Deselect curves and keys that no longer exist; show the curves of a newly selected joint.
+    view, clip = state.of(Curves), state.actor.clip
+    kind = f"{type(clip).__name__} {state.actor.animation}"
+    owner = (id(state.actor), kind, len(curves))
+    if owner != view.owner:
+        view.owner, view.joint = owner, -1
+        view.choose(_first_shown(state, curves, _first_number(state, curves)))
+    if state.selected_joint != view.joint:
+        view.joint = state.selected_joint
+        rows = _first_shown(state, curves, view.joint)
+        if view.joint >= 0 and rows:
+            view.choose(rows)
+            view.wants_scroll = True
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        drop_missing(view, keyed, len(curves))
     if imgui.begin_child("##channels", (_LIST_WIDTH * imgui.get_font_size(), 0.0)):
         _draw_list(state, curves)
     imgui.end_child()
@@ -83,25 +99,6 @@ def draw(state: AppState) -> None:
             _draw_key_fields(state, curves)
             _draw_modes(state)
         imgui.end_child()
-
-
-def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Deselect curves and keys that no longer exist; show the curves of a newly selected joint."""
-    view, clip = state.of(Curves), state.actor.clip
-    kind = f"{type(clip).__name__} {state.actor.animation}"
-    owner = (id(state.actor), kind, len(curves))
-    if owner != view.owner:
-        view.owner, view.joint = owner, -1
-        view.choose(_first_shown(state, curves, _first_number(state, curves)))
-    if state.selected_joint != view.joint:
-        view.joint = state.selected_joint
-        rows = _first_shown(state, curves, view.joint)
-        if view.joint >= 0 and rows:
-            view.choose(rows)
-            view.wants_scroll = True
-    keyed = keyed_of(state.actor)
-    if keyed is not None:
-        drop_missing(view, keyed, len(curves))
 
 
 def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
@@ -134,37 +131,24 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
     if not imgui.begin_child("##curve rows"):
         imgui.end_child()
         return
-    shown = _listed(curves, view.filter.lower())
+    # Each joint's number, as text, precedes its curves.
+    shown: list[int | str] = []
+    wanted = (r for r, c in enumerate(curves) if view.filter.lower() in c.label.lower())
+    for number, found in groupby(wanted, lambda row: curves[row].number):
+        shown += [str(number), *found]
     if not shown:
         imgui.text_disabled("no channel name contains this text")
     if view.wants_scroll:
         view.wants_scroll = False
         above = shown.index(view.rows[0]) - 1 if view.rows and view.rows[0] in shown else 0
         imgui.set_scroll_y(above * imgui.get_text_line_height_with_spacing())
-    clipper = imgui.ListClipper()
-    clipper.begin(len(shown))
-    while clipper.step():
-        for entry in shown[clipper.display_start : clipper.display_end]:
-            if isinstance(entry, str):
-                _draw_heading(state, curves, entry, shown)
-            else:
-                _draw_entry(state, curves, entry)
-    clipper.end()
+    for place in visible_rows(len(shown)):
+        entry = shown[place]
+        if isinstance(entry, str):
+            _draw_heading(state, curves, entry, shown)
+        else:
+            _draw_entry(state, curves, entry)
     imgui.end_child()
-
-
-def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
-    """Return the rows of listed curves; each joint's number, as text, precedes its curves."""
-    listed: list[int | str] = []
-    last: int | None = None
-    for row, curve in enumerate(curves):
-        if wanted and wanted not in curve.label.lower():
-            continue
-        if curve.number != last:
-            listed.append(str(curve.number))
-            last = curve.number
-        listed.append(row)
-    return listed
 
 
 def _draw_heading(
@@ -183,16 +167,13 @@ def _draw_entry(state: AppState, curves: tuple[Curve, ...], row: int) -> None:
     curve, view = curves[row], state.of(Curves)
     is_chosen = row in view.rows
     imgui.push_style_color(imgui.Col_.text, curve_color(view, curves, row))
-    if imgui.selectable(f"    {curve.name}{_key_count(state, row)}##row {row}", is_chosen)[0]:
+    keyed = keyed_of(state.actor)
+    keys = None if keyed is None else keyed.keys(row)
+    count = "" if keys is None or not len(keys[0]) else f"  {len(keys[0])}"
+    if imgui.selectable(f"    {curve.name}{count}##row {row}", is_chosen)[0]:
         _choose(state, (row,))
     imgui.pop_style_color()
     note_item(state, f"curve {curve.label}")
-
-
-def _key_count(state: AppState, row: int) -> str:
-    keyed = keyed_of(state.actor)
-    keys = None if keyed is None else keyed.keys(row)
-    return "" if keys is None or not len(keys[0]) else f"  {len(keys[0])}"
 
 
 def _choose(state: AppState, rows: tuple[int, ...]) -> None:
@@ -243,8 +224,13 @@ def _button_beside(state: AppState, text: str, tooltip: str) -> bool:
 def _draw_modes(state: AppState) -> None:
     """Draw the choices for whole channels: interpolation of transforms, extrapolation of DOFs."""
     rows, keyed = focused_rows(state.of(Curves)), keyed_of(state.actor)
-    if rows and isinstance(keyed, TransformKeys):
-        _draw_interpolation(state, keyed.channel(rows[0]))
+    moving = keyed.channel(rows[0]) if rows and isinstance(keyed, TransformKeys) else None
+    if moving is not None:
+        between = choice(state, "Interpolation", moving.interpolation, _INTERPOLATIONS)
+        explain("between the keys of the curves with selected keys, otherwise of all shown curves")
+        for each in INTERPOLATIONS:
+            if between == each != moving.interpolation:
+                interpolate(state, each)
     channel = channel_of(keyed.clip, rows[0]) if rows and isinstance(keyed, DofKeys) else None
     if channel is None:
         return
@@ -255,17 +241,6 @@ def _draw_modes(state: AppState) -> None:
         for mode in EXTRAPOLATIONS:
             if new == mode != now:
                 extrapolate(state, side, mode)
-
-
-def _draw_interpolation(state: AppState, channel: TransformChannel | None) -> None:
-    """Draw the choice of interpolation between the keys of the curves in focus."""
-    if channel is None:
-        return
-    new = choice(state, "Interpolation", channel.interpolation, _INTERPOLATIONS)
-    explain("between the keys of the curves with selected keys, otherwise of all shown curves")
-    for mode in INTERPOLATIONS:
-        if new == mode != channel.interpolation:
-            interpolate(state, mode)
 
 
 def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
@@ -296,7 +271,16 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
     channel = channel_of(keyed.clip, row) if isinstance(keyed, DofKeys) else None
     if channel is not None:
         for side, text in enumerate(_SIDES):
-            _draw_rule(state, channel, place, side, text)
+            # Draw the choice of the tangent rule on one side.
+            tangent = channel.tangents[place[1]][side]
+            now = tangent if isinstance(tangent, str) else "number"
+            new = choice(state, text, now, _TANGENTS)
+            if new == "number" != now:
+                # The slope computed by the rule keeps the curve unchanged.
+                change_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
+            for rule in TANGENT_RULES:
+                if new == rule != now:
+                    change_tangent(state, state.of(Curves).keys, side, rule)
     if len(view.keys) != 1:
         return
     # Explicit tangents have fields for their slopes, per second.
@@ -316,16 +300,3 @@ def _field(state: AppState, label: str, value: float) -> float | None:
     typed = number_field(state, begin_field(label), plain_zero(value, "%.5g"), "%.5g")
     note_item(state, label)
     return typed if typed is not None and abs(typed) < _FARTHEST else None
-
-
-def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, text: str) -> None:
-    """Draw the choice of the tangent rule on one side."""
-    tangent = channel.tangents[place[1]][side]
-    now = tangent if isinstance(tangent, str) else "number"
-    new = choice(state, text, now, _TANGENTS)
-    if new == "number" != now:
-        # The slope computed by the rule keeps the curve unchanged.
-        change_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
-    for rule in TANGENT_RULES:
-        if new == rule != now:
-            change_tangent(state, state.of(Curves).keys, side, rule)

@@ -10,7 +10,7 @@ from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Channel, Clip, evaluate_all
@@ -72,7 +72,12 @@ def curves_of(actor: Actor) -> tuple[Curve, ...]:
     """
     skeleton, clip = actor.figure.skeleton, actor.clip
     if clip is not None and clip.kind == "points":
-        return () if actor.figure.points is None else _point_curves(actor.figure.points)
+        points = actor.figure.points
+        return tuple(
+            Curve(printable(name, 60), number, _AXES[axis], axis, False)
+            for number, name in enumerate(() if points is None else points.names)
+            for axis in range(3)
+        )
     if skeleton is None:
         return ()
     if actor.transforms is not None:
@@ -117,14 +122,6 @@ def _joint_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
     return tuple(
         Curve(group, number, _AXES[axis], axis, is_angle)
         for group, number, is_angle in groups
-        for axis in range(3)
-    )
-
-
-def _point_curves(points: PointLayout) -> tuple[Curve, ...]:
-    return tuple(
-        Curve(printable(name, 60), number, _AXES[axis], axis, False)
-        for number, name in enumerate(points.names)
         for axis in range(3)
     )
 

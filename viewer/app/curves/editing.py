@@ -15,8 +15,7 @@ import numpy as np
 
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import channel_of, keyed_values
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files
 from viewer.data_classes import dataclass
 from viewer.formats import FORMATS, file_stem, write
@@ -429,14 +428,8 @@ def _n_keys(clip: Motion | None) -> int:
 
 def ask_for_clip(state: AppState) -> None:
     """Ask where to save the chosen actor's clip."""
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_clip(state, paths[0]),
-        "save",
-        "Save clip: .anim",
-        FORMATS["anim"].suffixes,
-        f"{file_stem(state.actor.name)}_edited.anim",
-    )
+    name = f"{file_stem(state.actor.name)}_edited.anim"
+    ask_where_to_write(state, save_clip, "Save clip: .anim", FORMATS["anim"].suffixes, name)
 
 
 def save_clip(state: AppState, path: Path) -> None:

@@ -111,31 +111,31 @@ def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
     implot.push_style_var(implot.StyleVar_.label_padding, (3.0, 2.0))
     shown = implot.begin_plot("##curves", (max(room.x, 60.0), max(room.y, 60.0)), flags)
     if shown:
-        _draw(state, curves)
+        view, no_label = state.of(Curves), implot.AxisFlags_.no_label
+        implot.setup_axes("seconds", "values", no_label, no_label)
+        implot.setup_axis_format(implot.ImAxis_.x1, "%g s")
+        for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
+            implot.setup_axis_limits_constraints(axis, -_FARTHEST, _FARTHEST)
+        if view.wants_fit:
+            implot.setup_axes_limits(*_fitting(state, curves), implot.Cond_.always)
+            view.wants_fit = False
+        implot.setup_finish()
+        plot = measured(state, curves)
+        _draw_outside(plot)
+        for row in view.rows:
+            _draw_line(plot, row)
+        # Of several overlapping items, the one drawn first gets the mouse.
+        touched = _draw_keys(plot)
+        _draw_time(plot)
+        _draw_range(plot)
+        edit(plot, touched)
+        # The unit of the values is in a corner.
+        text = unit_text(state, curves)
+        place, size = implot.get_plot_pos(), implot.get_plot_size()
+        corner = (place.x + 6.0, place.y + size.y - imgui.get_text_line_height() - 3.0)
+        implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(faint(_RANGE)), text)
         implot.end_plot()
     implot.pop_style_var(2)
-
-
-def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
-    view, no_label = state.of(Curves), implot.AxisFlags_.no_label
-    implot.setup_axes("seconds", "values", no_label, no_label)
-    implot.setup_axis_format(implot.ImAxis_.x1, "%g s")
-    for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
-        implot.setup_axis_limits_constraints(axis, -_FARTHEST, _FARTHEST)
-    if view.wants_fit:
-        implot.setup_axes_limits(*_fitting(state, curves), implot.Cond_.always)
-        view.wants_fit = False
-    implot.setup_finish()
-    plot = measured(state, curves)
-    _draw_outside(plot)
-    for row in view.rows:
-        _draw_line(plot, row)
-    # Of several overlapping items, the one drawn first gets the mouse.
-    touched = _draw_keys(plot)
-    _draw_time(plot)
-    _draw_range(plot)
-    edit(plot, touched)
-    _draw_units(plot)
 
 
 def unit_text(state: AppState, curves: tuple[Curve, ...]) -> str:
@@ -146,14 +146,6 @@ def unit_text(state: AppState, curves: tuple[Curve, ...]) -> str:
         "degrees" if state.in_degrees else "radians": any(curve.is_angle for curve in shown),
     }
     return ", ".join(unit for unit, is_used in units.items() if is_used)
-
-
-def _draw_units(plot: _Plot) -> None:
-    """Draw the unit of the values in a corner."""
-    text = unit_text(plot.state, plot.curves)
-    place, size = implot.get_plot_pos(), implot.get_plot_size()
-    corner = (place.x + 6.0, place.y + size.y - imgui.get_text_line_height() - 3.0)
-    implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(faint(_RANGE)), text)
 
 
 def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, float, float]:
@@ -330,12 +322,7 @@ def _draw_keys(plot: _Plot) -> bool:
     touched = [_draw_key(plot, *one) for one in chosen]
     touched.append(_draw_handles(plot))
     touched += [_draw_key(plot, *one) for one in places if one not in chosen]
-    _mark(plot, chosen)
-    return any(touched)
-
-
-def _mark(plot: _Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
-    """Draw the selected keys again, on top of everything."""
+    # The selected keys are drawn again, on top of everything.
     implot.push_plot_clip_rect()
     for place, time, value in chosen:
         middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
@@ -343,6 +330,7 @@ def _mark(plot: _Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
         draw_list.add_circle_filled(middle, 6.0 * _ui_scale(), imgui.get_color_u32(faint(1.0)))
         draw_list.add_circle_filled(middle, 3.5 * _ui_scale(), imgui.get_color_u32(inner))
     implot.pop_plot_clip_rect()
+    return any(touched)
 
 
 def _draw_many(plot: _Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
@@ -444,25 +432,20 @@ def edit(plot: _Plot, touched: bool) -> None:
         factors = [plot.factor(row) for row in view.rows]
         row = nearest_row(keyed, view, mouse.x, mouse.y, factors)
         if row >= 0:
-            _add_key(plot, keyed, row, mouse.x)
+            # An existing key at the mouse is selected instead.
+            keys = keyed.keys(row)
+            times = np.zeros(0) if keys is None else keys[0]
+            near = np.flatnonzero(np.abs(times - mouse.x) * plot.scale[0] <= _SAME_KEY)
+            if len(near):
+                view.keys = frozenset({(row, int(near[0]))})
+                at = number_text(float(times[near[0]]), ".4g")
+                state.say_status(f"There is already a key at {at} s")
+            else:
+                add_key_at(state, [row], mouse.x)
     elif _is_pressed(imgui.Key.delete):
         delete_chosen(state)
     elif is_free and imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
         view.keys = frozenset()
-
-
-def _add_key(plot: _Plot, keyed: KeyedMotion, row: int, time: float) -> None:
-    """Add a key at the mouse; an existing one there is selected instead."""
-    keys = keyed.keys(row)
-    times = np.zeros(0) if keys is None else keys[0]
-    near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
-    if len(near):
-        plot.view.keys = frozenset({(row, int(near[0]))})
-        plot.state.say_status(
-            f"There is already a key at {number_text(float(times[near[0]]), '.4g')} s"
-        )
-    else:
-        add_key_at(plot.state, [row], time)
 
 
 def _is_mouse_inside() -> bool:

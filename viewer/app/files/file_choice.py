@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import field
 from pathlib import Path, PurePath
+from typing import Literal
 from urllib.parse import unquote, urlsplit
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.formats import FORMATS
 from viewer.phrases import printable
 
@@ -14,46 +17,54 @@ PICTURES = (".png", ".jpg", ".jpeg")
 """File suffixes of texture images."""
 
 
+@dataclass(slots=True, eq=False)
 class FileDialog:
-    """An open folder and the files chosen in it.
+    """An open folder and the files chosen in it."""
 
-    ``done``: called with the state and the choice: files, one folder, or one file to write. If
-    omitted, the chosen files are opened. ``purpose``: ``"open"``, ``"folder"`` or ``"save"``.
-    ``suffixes``: suffixes of the listed files, and of those that can be written in place of the
-    suggested one; if empty, those of all formats that can be opened. ``name``: suggested name of
-    the file to write; its suffix is added to names without a suffix. ``written``: returns all files
-    that are written for a name; if omitted, only the named file is written. ``is_single``: whether
-    only one file can be chosen.
-    """
+    folder: Path
+    """Folder that is listed."""
+    done: Callable[[AppState, list[Path]], object] | None = None
+    """Called with the state and the choice: files, one folder, or one file to write."""
+    purpose: Literal["open", "folder", "save"] = "open"
+    """What is chosen."""
+    title: str = "Open files"
+    """Title of the dialog."""
+    suffixes: tuple[str, ...] = ()
+    """Suffixes of the listed files, and of those that can be written in place of the suggested one;
+    if empty, those of all formats that can be opened."""
+    name: str = ""
+    """Suggested or typed name of the file to write."""
+    more: Callable[[AppState, FileDialog], None] | None = None
+    """Draws further widgets below the list."""
+    more_rows: float = 0.0
+    """Height of those widgets, in lines of text."""
+    written: Callable[[Path], list[Path]] | None = None
+    """Returns all files that are written for a name; if omitted, only the named file is written."""
+    is_single: bool = False
+    """Whether only one file can be chosen."""
+    suffix: str = ""
+    """Suffix that is added to a name without one."""
+    suggested: str = ""
+    """Name that was suggested first."""
+    chosen: set[Path] = field(default_factory=set)
+    current: Path | None = None
+    """Chosen files, and the highlighted one."""
+    shows_all: bool = False
+    """Whether files with other suffixes are listed too."""
+    problem: str = ""
+    """Message above the list; empty if there is none."""
+    entries: list[Path] = field(default_factory=list)
+    folders: set[Path] = field(default_factory=set)
+    """Everything in the folder, and what of it is a folder."""
+    is_new: bool = True
+    """Whether it has not been drawn yet."""
+    is_path_active: bool = False
+    """Whether the field of the path has the focus."""
 
-    def __init__(
-        self,
-        folder: Path,
-        done: Callable[[AppState, list[Path]], None] | None = None,
-        purpose: str = "open",
-        title: str = "Open files",
-        suffixes: tuple[str, ...] = (),
-        name: str = "",
-        more: Callable[[AppState, FileDialog], None] | None = None,
-        more_rows: float = 0.0,
-        written: Callable[[Path], list[Path]] | None = None,
-        is_single: bool = False,
-    ) -> None:
-        self.is_single = is_single
-        self.more, self.more_rows, self.written = more, more_rows, written
-        self.done, self.purpose, self.title, self.name = done, purpose, title, name
-        self.suffixes = set(suffixes or opened_suffixes())
-        self.suffix, self.suggested = Path(name).suffix, name
-        self.folder = folder
-        self.chosen: set[Path] = set()
-        self.current: Path | None = None
-        self.shows_all = False
-        self.problem = ""
-        self.entries: list[Path] = []
-        self.folders: set[Path] = set()
-        self.is_new = True
-        self.is_path_active = False
-        self.enter(folder)
+    def __post_init__(self) -> None:
+        self.suffixes = self.suffixes or tuple(opened_suffixes())
+        self.suffix, self.suggested = Path(self.name).suffix, self.name
+        self.enter(self.folder)
 
     def enter(self, folder: Path) -> None:
         """Open a folder; if it cannot be read, the dialog stays in the current one."""

@@ -61,7 +61,9 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     dialog.shows_all = imgui.checkbox("All files", dialog.shows_all)[1]
     if dialog.problem:
         imgui.text_wrapped(dialog.problem)
-    result = _draw_file_list(state, dialog, _foot_height(dialog))
+    below = 1.5 * imgui.get_frame_height() + imgui.get_style().item_spacing.y
+    below += dialog.more_rows * imgui.get_text_line_height_with_spacing()
+    result = _draw_file_list(state, dialog, below)
     return result or _draw_buttons(state, dialog)
 
 
@@ -99,7 +101,7 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
     imgui.same_line()
     if button(state, "Cancel"):
         state.of(Files).dialog = None
-    if dialog.purpose == "open" and dialog.suffixes >= _RIG:
+    if dialog.purpose == "open" and _RIG.issubset(dialog.suffixes):
         imgui.same_line()
         imgui.text_disabled("Ctrl+click selects several: a .skel and its .skin")
         note_item(state, "several files")
@@ -149,15 +151,6 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
         target = dialog.target()
         return [] if target is None else [target]
     return sorted(dialog.chosen)
-
-
-def _foot_height(dialog: FileDialog) -> float:
-    """Return the height of the widgets below the list."""
-    return (
-        1.5 * imgui.get_frame_height()
-        + dialog.more_rows * imgui.get_text_line_height_with_spacing()
-        + imgui.get_style().item_spacing.y
-    )
 
 
 def _draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Path]:

@@ -255,9 +255,36 @@ def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
                 actor.clip = with_rate(actor.captured, rate)
 
 
-def ask_for_files(state: AppState) -> None:
-    """Open the dialog that opens files."""
-    state.of(Files).dialog = FileDialog(folder_of(state.paths), open_files)
+def ask_for_files(
+    state: AppState,
+    act: Callable[[AppState, list[Path]], object] | None = None,
+    title: str = "Open files",
+    suffixes: tuple[str, ...] = (),
+    is_single: bool = False,
+) -> None:
+    """Ask for files, which are opened unless another action is given."""
+    start = folder_of(state.paths)
+    dialog = FileDialog(start, act or open_files, "open", title, suffixes, is_single=is_single)
+    state.of(Files).dialog = dialog
+
+
+def ask_where_to_write(
+    state: AppState,
+    write: Callable[[AppState, Path], object],
+    title: str,
+    suffixes: tuple[str, ...],
+    name: str,
+    more: Callable[[AppState, FileDialog], None] | None = None,
+    more_rows: float = 0.0,
+    written: Callable[[Path], list[Path]] | None = None,
+) -> None:
+    """Ask for the file to write; the parameters are those of ``FileDialog``."""
+
+    def done(state: AppState, paths: list[Path]) -> None:
+        write(state, paths[0])
+
+    start, last = folder_of(state.paths), (more, more_rows, written)
+    state.of(Files).dialog = FileDialog(start, done, "save", title, suffixes, name, *last)
 
 
 def offer_files(state: AppState, text: str) -> None:

@@ -40,8 +40,7 @@ def draw_model_menu(state: AppState) -> None:
             _draw_missing(state, kind, model)
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
-        start = load_model_folder() or folder_of(state.paths)
-        files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
+        ask_for_model_folder(state)
 
 
 def _draw_rigs(state: AppState, name: str, path: Path) -> None:
@@ -71,7 +70,12 @@ def _draw_missing(state: AppState, kind: str, model: Publication) -> None:
     if kind in ADDABLE:
         label, why = f"Add {model.title}…", no_job_room(state)
         if imgui.menu_item(label, model.licence, False, not why)[0]:
-            _start_adding(state, kind)
+
+            def add() -> list[str]:
+                name, where = add_model(kind).name, f"File > Models > {kind}"
+                return [f"{model.title} was added: open it with {where} ({name})"]
+
+            state.job = ThreadJob(f"Downloading {model.title}", add, output="download")
         note_item(state, label)
         explain(f"{model.about}; downloaded with pip into your data folder", why)
         return
@@ -80,15 +84,11 @@ def _draw_missing(state: AppState, kind: str, model: Publication) -> None:
     explain("", f"{model.about}; published at {model.address}")
 
 
-def _start_adding(state: AppState, kind: str) -> None:
-    """Download a model in a thread."""
-    title = CATALOG[kind].title
-
-    def add() -> list[str]:
-        path = add_model(kind)
-        return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
-
-    state.job = ThreadJob(f"Downloading {title}", add, output="download")
+def ask_for_model_folder(state: AppState) -> None:
+    """Ask for the folder of body models."""
+    start = load_model_folder() or folder_of(state.paths)
+    dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
+    state.of(Files).dialog = dialog
 
 
 def set_model_folder(state: AppState, paths: list[Path]) -> None:

@@ -14,8 +14,8 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_item
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.files import ask_where_to_write
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import RigError, ViewerError
@@ -77,10 +77,9 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     # The number of each person is appended to the name if there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_motion(state, paths[0], selection.everyone, selection.safe_names),
-        "save",
+    ask_where_to_write(
+        state,
+        lambda state, path: save_motion(state, path, selection.everyone, selection.safe_names),
         "Export motion",
         suffixes,
         f"{stem}_edited{suffix}" if suffix else f"{stem}{suffixes[0]}",
@@ -360,7 +359,10 @@ def _draw_formats(
     for suffix, kind in formats.items():
         why = missing.get(suffix, "")
         if _draw_row(state, suffix, kind, suffix == now, why) and not why:
-            _choose(dialog, suffix, typed if typed in formats else "")
+            old = typed if typed in formats else ""
+            name = dialog.typed_name()
+            dialog.suffix = "" if suffix == FOLDER else suffix
+            dialog.name = name[: len(name) - len(old)] + dialog.suffix
     imgui.end_table()
     note_item(state, "formats")
 
@@ -382,10 +384,3 @@ def _draw_row(state: AppState, suffix: str, kind: Exporter, is_chosen: bool, why
             imgui.table_next_column()
             imgui.text_unformatted(text)
     return pressed
-
-
-def _choose(dialog: FileDialog, suffix: str, old: str) -> None:
-    """Replace the suffix of the name by a format's suffix."""
-    name = dialog.typed_name()
-    dialog.suffix = "" if suffix == FOLDER else suffix
-    dialog.name = name[: len(name) - len(old)] + dialog.suffix

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import platformdirs
 
@@ -98,7 +97,12 @@ def _layout(data: bytes) -> str:
     if has_checksum(data):
         return checked(data)
     text = data.decode("utf-8")
-    _check_sections(text)
+    first, *lines, last = text.split("\n")
+    if not _SECTION.fullmatch(first) or last:
+        raise ValueError("not written completely")
+    kinds = _SECTION, _ENTRY, _DOCK
+    if not all(not line or any(kind.fullmatch(line) for kind in kinds) for line in lines):
+        raise ValueError("a line that ImGui does not write")
     _check_docks([found for line in text.split("\n") if (found := _DOCK.fullmatch(line))])
     return text
 
@@ -115,16 +119,6 @@ _DOCK = re.compile(
     rf"( NoResize=1)?(?P<central> CentralNode=1)?( (NoTabBar|HiddenTabBar)=1)?"
     rf"( NoWindowMenuButton=1)?( NoCloseButton=1)?( Selected={_HEX})?"
 )
-
-
-def _check_sections(text: str) -> None:
-    """Raise ValueError unless every line is one that ImGui writes."""
-    first, *lines, last = text.split("\n")
-    if not _SECTION.fullmatch(first) or last:
-        raise ValueError("not written completely")
-    kinds = _SECTION, _ENTRY, _DOCK
-    if not all(not line or any(kind.fullmatch(line) for kind in kinds) for line in lines):
-        raise ValueError("a line that ImGui does not write")
 
 
 def _check_docks(docks: Sequence[re.Match[str]]) -> None:
@@ -152,14 +146,15 @@ def save_layout(text: str) -> str:
     return save_kept(state_folder() / "layout.ini", with_checksum(text))
 
 
-def _list(found: Any) -> list[Any]:
+def _list(found: object) -> list[object]:
     if not isinstance(found, list):
         raise ValueError("expected a list")
     return found
 
 
-def _texts(found: Any) -> list[str]:
-    texts = _list(found)
-    if not all(isinstance(text, str) and text and "\0" not in text for text in texts):
+def _texts(found: object) -> list[str]:
+    entries = _list(found)
+    texts = [text for text in entries if isinstance(text, str) and text and "\0" not in text]
+    if len(texts) < len(entries):
         raise ValueError("expected a list of names")
     return texts

@@ -15,8 +15,16 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.scene_version import ActorVersion, SceneVersion
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
-from viewer.app.core.theme import ink
-from viewer.app.core.widgets import button, choice, explain, note_item, same_line_if_room, slider
+from viewer.app.core.theme import WARNING, ink, text_color
+from viewer.app.core.widgets import (
+    button,
+    choice,
+    explain,
+    note_item,
+    same_line_if_room,
+    slider,
+    warning,
+)
 from viewer.app.layout import show_panel
 from viewer.app.playback.animations import choose_animation
 from viewer.app.view.picks import take_pick
@@ -35,16 +43,16 @@ from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
 from viewer.phrases import counted, printable
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rendering.picking import Pick
+from viewer.rendering.recorder import copied
 from viewer.rig.mesh import box_size
 from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Scene, scene_unit
 
 _COLORS = {
     "error": (1.0, 0.42, 0.36, 1.0),
-    "warning": (1.0, 0.77, 0.30, 1.0),
+    "warning": WARNING,
     "note": (0.52, 0.74, 1.0, 1.0),
 }
-_STALE_COLOR = _COLORS["warning"]
 _GROUNDS = {
     "auto": "estimated from the feet",
     "height": "at a height",
@@ -133,30 +141,6 @@ def draw(state: AppState) -> None:
         view.was_shown = True
         start_check(state)
     known = view.checked
-    _draw_buttons(state, known)
-    if view.running is not None:
-        _draw_progress(state)
-    if known is None:
-        if view.running is None:
-            imgui.text_wrapped("This scene has not been checked yet.")
-        return
-    if _is_stale(state):
-        _draw_warning("The figure, pose or limits have changed since the check.")
-    for note in known.notes:
-        _draw_warning(note)
-    _draw_filters(state, known)
-    if view.chosen >= 0 and view.marks_note:
-        imgui.text_wrapped(view.marks_note)
-    _draw_list(state, known)
-
-
-def _draw_warning(text: str) -> None:
-    imgui.push_style_color(imgui.Col_.text, ink(_STALE_COLOR))
-    imgui.text_wrapped(text)
-    imgui.pop_style_color()
-
-
-def _draw_buttons(state: AppState, known: Checked | None) -> None:
     if button(state, "Check" if known is None else "Recheck", no_job_room(state)):
         start_check(state)
     explain("check rigs, meshes and motions in their current state, and the files")
@@ -168,11 +152,24 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
     same_line_if_room("Copy text")
     if button(state, "Copy text", why):
         _copy_findings(state, as_json=False)
-    if not why:
-        explain("all findings, as the command viewer lint prints them")
+    explain("all findings, as the command viewer lint prints them")
     same_line_if_room("Copy JSON")
     if button(state, "Copy JSON", why):
         _copy_findings(state, as_json=True)
+    if view.running is not None:
+        _draw_progress(state)
+    if known is None:
+        if view.running is None:
+            imgui.text_wrapped("This scene has not been checked yet.")
+        return
+    if _is_stale(state):
+        warning("The figure, pose or limits have changed since the check.")
+    for note in known.notes:
+        warning(note)
+    _draw_filters(state, known)
+    if view.chosen >= 0 and view.marks_note:
+        imgui.text_wrapped(view.marks_note)
+    _draw_list(state, known)
 
 
 def _draw_limits(state: AppState) -> None:
@@ -248,9 +245,8 @@ def _draw_filters(state: AppState, known: Checked) -> None:
         text = f"{counts[severity]:,} {severity}{'s' * (counts[severity] != 1)}"
         if severity != SEVERITIES[-1]:
             same_line_if_room(text)
-        imgui.push_style_color(imgui.Col_.text, ink(_COLORS[severity]))
-        changed, _ = imgui.checkbox(f"{text}###{severity}", severity in view.severities)
-        imgui.pop_style_color()
+        with text_color(_COLORS[severity]):
+            changed, _ = imgui.checkbox(f"{text}###{severity}", severity in view.severities)
         note_item(state, f"lint {severity}")
         if changed:
             view.severities ^= {severity}
@@ -320,26 +316,21 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
         else:
             _copy_place(state, finding)
     note_item(state, f"finding {index}")
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        _draw_tooltip(state, finding)
-    imgui.set_cursor_screen_pos(place)
-    _draw_severity(finding.severity)
-    imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
-    imgui.text_colored(ink(_COLORS[finding.severity]), finding.code)
-
-
-def _draw_tooltip(state: AppState, finding: Finding) -> None:
-    if imgui.begin_tooltip():
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal) and imgui.begin_tooltip():
         imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
         imgui.text_colored(ink(_COLORS[finding.severity]), f"{finding.severity} {finding.code}")
         imgui.text_unformatted(finding.title)
-        if _file_place(finding):
-            imgui.text_unformatted(_file_place(finding))
+        if finding.place():
+            imgui.text_unformatted(finding.place())
         imgui.text_unformatted(printable(finding.message, 2000))
         imgui.text_unformatted(f"Remedy: {finding.hint}")
         imgui.text_disabled(_click_text(state, finding))
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+    imgui.set_cursor_screen_pos(place)
+    _draw_severity(finding.severity)
+    imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
+    imgui.text_colored(ink(_COLORS[finding.severity]), finding.code)
 
 
 def _click_text(state: AppState, finding: Finding) -> str:
@@ -348,7 +339,7 @@ def _click_text(state: AppState, finding: Finding) -> str:
         return "click to show it in the view; click again or press Esc to stop"
     if _is_in_scene(state, finding):
         return "click to select the actor: its figure has changed since the check"
-    if not _file_place(finding):
+    if not finding.place():
         return "this finding has no location in the view"
     copied = "its path" if finding.line is None else "its path and line"
     if finding.pointer:
@@ -395,7 +386,7 @@ def start_check(state: AppState) -> None:
     if no_job_room(state):
         return
     source, options, running = state.scene, _options(state), _Running()
-    copy, version, paths = _copied(source), state.update_version(), state.paths
+    copy, version, paths = copied(source), state.update_version(), state.paths
     settings, since = state.motion_settings, state.opened_at
 
     def check() -> list[str]:
@@ -413,11 +404,6 @@ def start_check(state: AppState) -> None:
 def _options(state: AppState) -> LintOptions:
     """Return the limits of the check, with the timeline's frame rate."""
     return replace(state.of(Linting).options, frame_rate=state.clock.keyed_rate)
-
-
-def _copied(scene: Scene) -> Scene:
-    """Return a copy of the scene whose poses stay unchanged."""
-    return Scene([actor.copy() for actor in scene.actors], world_up=scene.up)
 
 
 def _take_findings(state: AppState) -> None:
@@ -512,15 +498,10 @@ def _is_known_there(state: AppState, finding: Finding) -> bool:
     return state.scene.actors[index].figure is known.scene.actors[index].figure
 
 
-def _file_place(finding: Finding) -> str:
-    """Return ``path:line`` or ``path#pointer`` of a finding; empty if it is not about a file."""
-    return finding.place()
-
-
 def _copy_place(state: AppState, finding: Finding) -> None:
     """Copy path and line of a finding that is not about an actor, and clear the selection."""
     _choose_finding(state, -1)
-    place = _file_place(finding)
+    place = finding.place()
     if place:
         imgui.set_clipboard_text(place)
         state.say_status(f"Copied {place}")

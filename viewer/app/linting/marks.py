@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import pose_key
 from viewer.rig.scene import actor_points
 
 _MOST = 3000  # maximum number of marked vertices, and of marked triangle edges
@@ -63,18 +61,11 @@ def _key(state: AppState) -> object:
         return None
     if finding is None or finding.actor is None or finding.actor >= len(state.scene.actors):
         return None
-    actor = state.scene.actors[finding.actor]
+    actor = state.version.actors[finding.actor]
     if actor.figure is not known.scene.actors[finding.actor].figure:
         return None  # the finding's indices may be invalid for the new figure
-    options = state.options
-    return (
-        id(finding),
-        actor.placement.tobytes(),
-        pose_key(actor.pose) if actor.pose else (),
-        b"" if actor.points is None else actor.points.tobytes(),
-        astuple(options.skinning),
-        options.show == "binding",
-    )
+    options = state.version.options
+    return id(finding), actor, options.skinning, options.show == "binding"
 
 
 def marks_of(places: Places) -> tuple[Marks, str]:

@@ -41,7 +41,11 @@ _LIMITS = (0.01, 1000.0)
 def draw(state: AppState) -> None:
     """Draw the panel."""
     if state.actor.figure.animations:
-        _draw_animation(state)
+        texts = {str(index): text for index, text in animation_texts(state.actor).items()}
+        width = min(max(map(len, texts.values())) * 0.6 + 2.0, _WIDEST_LIST)
+        new = choice(state, "Animation", str(played(state.actor)), texts, width)
+        explain("motion of this file, played by all of its figures ([ and ])")
+        choose_animation(state, int(new))
     if not state.clock.has_motion:
         offer_files(state, f"There is {no_motion(state)}.")
         return
@@ -49,20 +53,28 @@ def draw(state: AppState) -> None:
         same_line_if_room("M" * 12)
     _draw_transport(state)
     same_line_if_room("000000")
-    _draw_place(state)
+    clock = state.clock
+    shown = clock.frame + clock.first_frame
+    frame = whole_field(state, begin_field("Frame##frame", 4.5), shown)
+    note_item(state, "Frame")
+    explain("current frame")
+    if frame is not None and frame != shown:
+        clock.playing = False
+        clock.seek(clock.frame_time(frame - clock.first_frame))
+    first, last = (clock.first_frame + number for number in clock.frame_range)
+    text = f"of {first} to {last}    {number_text(clock.time, '.3f')} s"
+    same_line_if_room(text)
+    imgui.text_unformatted(text)
     same_line_if_room("M" * 9)
-    _draw_rate(state)
+    foreign = foreign_rate(state)
+    with disabled(state, foreign):
+        typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
+        note_item(state, "Frame rate")
+        explain("play the same frames faster or slower", foreign)
+    if typed is not None:
+        set_rate(state, typed)
     _draw_settings(state)
     draw_tracks(state)
-
-
-def _draw_animation(state: AppState) -> None:
-    """Draw the list of the chosen actor's animations."""
-    texts = {str(index): text for index, text in animation_texts(state.actor).items()}
-    width = min(max(map(len, texts.values())) * 0.6 + 2.0, _WIDEST_LIST)
-    new = choice(state, "Animation", str(played(state.actor)), texts, width)
-    explain("motion of this file, played by all of its figures ([ and ])")
-    choose_animation(state, int(new))
 
 
 def _draw_transport(state: AppState) -> None:
@@ -89,32 +101,6 @@ def _draw_transport(state: AppState) -> None:
     if button(state, ">|"):
         go_to_end(state, last=True)
     explain(with_key(state, "last frame of the range", "End"))
-
-
-def _draw_place(state: AppState) -> None:
-    clock = state.clock
-    shown = clock.frame + clock.first_frame
-    frame = whole_field(state, begin_field("Frame##frame", 4.5), shown)
-    note_item(state, "Frame")
-    explain("current frame")
-    if frame is not None and frame != shown:
-        clock.playing = False
-        clock.seek(clock.frame_time(frame - clock.first_frame))
-    first, last = (clock.first_frame + number for number in clock.frame_range)
-    text = f"of {first} to {last}    {number_text(clock.time, '.3f')} s"
-    same_line_if_room(text)
-    imgui.text_unformatted(text)
-
-
-def _draw_rate(state: AppState) -> None:
-    """Draw the field of the frame rate."""
-    foreign = foreign_rate(state)
-    with disabled(state, foreign):
-        typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
-        note_item(state, "Frame rate")
-        explain("play the same frames faster or slower", foreign)
-    if typed is not None:
-        set_rate(state, typed)
 
 
 def _draw_settings(state: AppState) -> None:

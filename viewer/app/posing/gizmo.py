@@ -134,8 +134,11 @@ def use_handles(state: AppState) -> bool:
     place = (io.mouse_pos.x, io.mouse_pos.y)
     if posing.drag is not None:
         return _go_on(state, posing.drag, place)
-    if posing.has_missed:
-        return _end_miss(state)
+    if posing.has_missed:  # the rest of a drag beside a handle is ignored, but not a click
+        if imgui.is_mouse_down(_LEFT):
+            return True
+        posing.has_missed = False
+        return imgui.get_io().mouse_drag_max_distance_sqr[_LEFT] > _STILL**2
     if not posing.is_on or io.want_capture_mouse or no_tool(state):
         return False
     if io.key_shift or io.key_alt:  # Shift pans, Alt picks vertices
@@ -189,14 +192,6 @@ def _is_beside_handle(state: AppState, place: Place) -> bool:
         return True
     found_arrows = arrows(posed, posing.orientation)
     return grab_arrow(found_arrows, posed.center, frame, place, _BESIDE) is not None
-
-
-def _end_miss(state: AppState) -> bool:
-    """Ignore a drag next to a handle until the button is released; return False for a click."""
-    if imgui.is_mouse_down(_LEFT):
-        return True
-    state.of(Posing).has_missed = False
-    return imgui.get_io().mouse_drag_max_distance_sqr[_LEFT] > _STILL**2
 
 
 def _apart(one: Place, other: Place) -> float:

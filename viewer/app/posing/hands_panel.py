@@ -60,8 +60,13 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
         note_item(state, f"{side} {name}")
         if flat:
             same_line_if_room("Mean")
-    vectors = _vectors(figure, pose, hand)
-    values = _values(hand, vectors)
+    assert figure.skeleton is not None  # hands imply a skeleton
+    vectors = matrix_to_rotation_vector(joint_rotations(figure.skeleton, pose)[hand.joints])
+    values = _coefficients.get(
+        hand,
+        vectors.tobytes(),
+        lambda: hand_coefficients(hand, vectors, flat=False, count=len(hand.components)),
+    )
     for index in range(min(state.of(Posing).n_hand_components, len(hand.components))):
         field = begin_field(f"{side.capitalize()} {index}##{side} {index}")
         shown = plain_zero(float(values[index]), "%.2f")
@@ -71,20 +76,6 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
             # The other components, and the residual outside their span, stay unchanged.
             step = (value - values[index]) * hand.components[index].reshape(-1, 3)
             _rotate(figure, pose, hand, vectors + step)
-
-
-def _vectors(figure: Figure, pose: Pose, hand: Hand) -> Floats:
-    assert figure.skeleton is not None  # hands imply a skeleton
-    return matrix_to_rotation_vector(joint_rotations(figure.skeleton, pose)[hand.joints])
-
-
-def _values(hand: Hand, vectors: Floats) -> Floats:
-    """Return the coefficients of all components, relative to the mean hand."""
-    return _coefficients.get(
-        hand,
-        vectors.tobytes(),
-        lambda: hand_coefficients(hand, vectors, flat=False, count=len(hand.components)),
-    )
 
 
 def _rotate(figure: Figure, pose: Pose, hand: Hand, vectors: Floats) -> None:

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import drag_float, in_row, slider_float
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
+from viewer.app.core.widgets import is_reset, note_item, plain_zero, show_tooltip
 from viewer.app.posing.posing import HeldVector, Posing, pause_for_edit
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
@@ -29,6 +29,7 @@ from viewer.rig.posing.pose_vector import (
 )
 from viewer.rig.skeleton import Skeleton
 
+_DRAGS = "drag, or Ctrl+click to type a value; double-click to reset"
 _LABEL_WIDTH = 4.2  # width of a label, in font sizes
 _LARGEST = 1e9
 _NOTICEABLE = 1e-4  # tolerance for rounding, relative to the longest bone or a scale of 1
@@ -97,7 +98,7 @@ def draw_translation(state: AppState, pose: Pose, joint: int, label: str) -> Non
             pose.translations[joint, axis] = moved
 
     _draw_row(state, f"{label}.translation", "move", joint, draw_axis)
-    if _is_reset(f"{label}: translation from rest, along the parent's axes"):
+    if is_reset(f"{label}: translation from rest, along the parent's axes\n{_DRAGS}"):
         pose.translations[joint] = 0.0
 
 
@@ -112,7 +113,7 @@ def draw_scale(state: AppState, pose: Pose, joint: int, label: str) -> None:
             pose.scales[joint, axis] = moved
 
     _draw_row(state, f"{label}.scale", "scale", joint, draw_axis)
-    if _is_reset(f"{label}: scale along its own axes"):
+    if is_reset(f"{label}: scale along its own axes\n{_DRAGS}"):
         pose.scales[joint] = skeleton.rest_scales[joint]
 
 
@@ -134,14 +135,6 @@ def _draw_row(
 
     in_row(f"##{text}{joint}", range(3), draw)
     note_item(state, name)
-
-
-def _is_reset(text: str) -> bool:
-    """Show the tooltip of the last row, and return whether a double-click resets the row."""
-    if not imgui.is_item_hovered():
-        return False
-    show_tooltip(f"{text}\ndrag, or Ctrl+click to type a value; double-click to reset")
-    return imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
 
 
 def is_ball(figure: Figure, joint: int) -> bool:
@@ -172,15 +165,12 @@ def draw_vector_component(
         text,
     )
     note_item(state, f"{label}.r{'xyz'[axis]}")
-    is_reset = False
-    if imgui.is_item_hovered():
-        show_tooltip(
-            f"{label}: component of the rotation vector\n"
-            "Ctrl+click to type a value, double-click to set it to 0"
-        )
-        is_reset = imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
-    if is_reset or (changed and math.isfinite(moved) and abs(moved) < 1e6):
-        vector[axis] = 0.0 if is_reset else moved / factor
+    becomes_zero = is_reset(
+        f"{label}: component of the rotation vector\n"
+        "Ctrl+click to type a value, double-click to set it to 0"
+    )
+    if becomes_zero or (changed and math.isfinite(moved) and abs(moved) < 1e6):
+        vector[axis] = 0.0 if becomes_zero else moved / factor
         rotation = rotation_vector_to_matrix(vector)
         joints = np.array([joint], dtype=np.int32)
         set_joint_rotations(skeleton, pose, joints, rotation[None])

@@ -7,7 +7,6 @@ from dataclasses import field
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.rig.hierarchy import path_to_root
-from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 
 _MOST_OPENED = 128  # rigs with more joints are initially collapsed
@@ -32,18 +31,12 @@ def joint_tree(state: AppState) -> JointTree:
     tree = state.of(JointTree)
     if tree.n_choices != state.n_choices:
         tree.n_choices = state.n_choices
-        tree.filter, tree.opened = "", _first_opened(state.actor)
+        tree.filter, skeleton = "", state.actor.figure.skeleton
+        parents = [] if skeleton is None else skeleton.parents.tolist()
+        # All joints of a small rig are expanded, otherwise the roots.
+        is_small = len(parents) <= _MOST_OPENED
+        tree.opened = {joint for joint, parent in enumerate(parents) if is_small or parent < 0}
     return tree
-
-
-def _first_opened(actor: Actor) -> set[int]:
-    """Return the joints that are initially expanded: all of a small rig, otherwise the roots."""
-    skeleton = actor.figure.skeleton
-    if skeleton is None:
-        return set()
-    if skeleton.n_joints <= _MOST_OPENED:
-        return set(range(skeleton.n_joints))
-    return {joint for joint, parent in enumerate(skeleton.parents) if parent < 0}
 
 
 def select_joint(state: AppState, joint: int) -> None:

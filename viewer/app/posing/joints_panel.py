@@ -15,12 +15,13 @@ from viewer.app.core.theme import ink
 from viewer.app.core.widgets import (
     button,
     checkbox,
-    explain,
+    is_reset,
     menu_item,
     note_item,
     plain_zero,
+    radio,
     same_line_if_room,
-    show_tooltip,
+    visible_rows,
     with_key,
 )
 from viewer.app.curves.editing import Curves
@@ -78,6 +79,13 @@ _TRANSLATION, _SCALE = -3, -4
 _LONGEST = 60  # maximum length of a name in characters
 _known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 _known_rows: Memo[Skeleton, _Rows] = Memo(kept=4)
+_ON_POSES = (
+    ("Copy as JSON", copy_pose),
+    ("Copy as raw pose values", copy_numbers),
+    ("Paste", paste_pose),
+    ("Mirror", mirror),
+)
+"""Menu of actions on the whole pose."""
 _SEEN, _DOUBTFUL = (0.30, 0.55, 0.38, 1.0), (0.62, 0.42, 0.22, 1.0)
 _NAME_WIDTH = 0.55  # width of the names, as a fraction of the panel's width
 
@@ -108,33 +116,26 @@ def draw(state: AppState) -> None:
     labels = _row_labels(skeleton)
     if not shown:
         imgui.text_disabled("no joint name contains this text")
-    clipper = imgui.ListClipper()
-    clipper.begin(len(shown))
-    _include_wanted(state, clipper, shown)
-    while clipper.step():
-        for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
-            if dof == _OWN_NUMBERS:
-                _indent(depth)
-                draw_own_numbers(state, actor.figure, actor.pose, joint)
-            elif dof == _TRANSLATION:
-                _indent(depth)
-                draw_translation(state, actor.pose, joint, labels[joint])
-            elif dof == _SCALE:
-                _indent(depth)
-                draw_scale(state, actor.pose, joint, labels[joint])
-            elif dof < 0:
-                _draw_joint(state, joint, depth, labels[joint])
-            else:
-                _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
-    clipper.end()
+    # The list scrolls to a joint that was selected elsewhere.
+    wanted = -1
+    if tree.scrolls_to >= 0:
+        own = (row for row, one in enumerate(shown) if one[:2] == (tree.scrolls_to, -1))
+        wanted = next(own, -1)
+    for row in visible_rows(len(shown), wanted=wanted):
+        joint, dof, depth = shown[row]
+        indent = _INDENT * imgui.get_font_size() * min(depth, _DEEPEST)
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
+        if dof == _OWN_NUMBERS:
+            draw_own_numbers(state, actor.figure, actor.pose, joint)
+        elif dof == _TRANSLATION:
+            draw_translation(state, actor.pose, joint, labels[joint])
+        elif dof == _SCALE:
+            draw_scale(state, actor.pose, joint, labels[joint])
+        elif dof < 0:
+            _draw_joint(state, joint, labels[joint])
+        else:
+            _draw_dof(state, skeleton, actor.pose, dof, labels[joint])
     imgui.end_child()
-
-
-def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: _Rows) -> None:
-    """Include the row of a joint selected elsewhere, so that the list can scroll to it."""
-    for row, (joint, dof, _) in enumerate(shown if joint_tree(state).scrolls_to >= 0 else ()):
-        if joint == joint_tree(state).scrolls_to and dof == -1:
-            clipper.include_item_by_index(row)
 
 
 def _draw_actor_choice(state: AppState) -> None:
@@ -163,44 +164,25 @@ def _draw_head(state: AppState) -> None:
     same_line_if_room("Pose…")
     if button(state, "Pose…"):
         imgui.open_popup("pose menu")
-    _draw_pose_menu(state)
+    if imgui.begin_popup("pose menu"):
+        for text, action in _ON_POSES:
+            if menu_item(state, text):
+                action(state)
+        imgui.end_popup()
     same_line_if_room("deg")
-    if imgui.radio_button("deg###degrees", state.in_degrees):
-        _show_angles(state, in_degrees=True)
-    note_item(state, "degrees")
-    explain("show angles in degrees")
+    before = state.in_degrees
+    if radio(state, "deg###degrees", before, "degrees", "show angles in degrees"):
+        state.in_degrees = True
     same_line_if_room("rad")
-    if imgui.radio_button("rad###radians", not state.in_degrees):
-        _show_angles(state, in_degrees=False)
-    note_item(state, "radians")
-    explain("show angles in radians")
+    if radio(state, "rad###radians", not before, "radians", "show angles in radians"):
+        state.in_degrees = False
+    # Curves are fitted again because the scale of their axis changes.
+    state.of(Curves).wants_fit |= state.in_degrees != before
     if state.actor.figure.pose_layout is not None:
         posing.as_vectors = checkbox(state, "Rotation vectors", posing.as_vectors)
 
 
-def _show_angles(state: AppState, in_degrees: bool) -> None:
-    """Set the unit of angles; curves are fitted again because the scale of the axis changes."""
-    state.of(Curves).wants_fit |= in_degrees != state.in_degrees
-    state.in_degrees = in_degrees
-
-
-def _draw_pose_menu(state: AppState) -> None:
-    """Draw the menu of actions on the whole pose."""
-    if not imgui.begin_popup("pose menu"):
-        return
-    for text, action in (
-        ("Copy as JSON", copy_pose),
-        ("Copy as raw pose values", copy_numbers),
-        ("Paste", paste_pose),
-        ("Mirror", mirror),
-    ):
-        if menu_item(state, text):
-            action(state)
-    imgui.end_popup()
-
-
-def _draw_joint(state: AppState, joint: int, depth: int, label: str) -> None:
-    _indent(depth)
+def _draw_joint(state: AppState, joint: int, label: str) -> None:
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
     flags |= imgui.TreeNodeFlags_.span_avail_width
     if joint == state.selected_joint:
@@ -223,17 +205,9 @@ def _draw_joint(state: AppState, joint: int, depth: int, label: str) -> None:
         imgui.end_popup()
 
 
-def _indent(depth: int) -> None:
-    indent = _INDENT * imgui.get_font_size() * min(depth, _DEEPEST)
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
-
-
-def _draw_dof(
-    state: AppState, skeleton: Skeleton, pose: Pose, dof: int, depth: int, label: str
-) -> None:
+def _draw_dof(state: AppState, skeleton: Skeleton, pose: Pose, dof: int, label: str) -> None:
     kind = int(skeleton.dof_kinds[dof])
     name = DOF_KINDS[kind]
-    _indent(depth)
     imgui.align_text_to_frame_padding()
     start = imgui.get_cursor_pos_x()
     imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), name)
@@ -253,10 +227,9 @@ def _draw_dof(
         pause_for_edit(state)
     imgui.end_disabled()
     note_item(state, f"{label}.{name}")
-    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        show_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind, state.in_degrees)}")
-        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
-            value = float(skeleton.rest_dofs[dof])
+    limits = _limits_text(low, high, kind, state.in_degrees)
+    if is_reset(f"{label}.{name}\n{limits}") and not locked:
+        value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
         why = f"locked at {_value_text(low, kind, state.in_degrees)}" if locked else ""
         if menu_item(state, "Reset", why=why):
@@ -394,10 +367,8 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
         state, f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f"
     )
     note_item(state, f"figure.{name}")
-    if imgui.is_item_hovered():
-        show_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")
-        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-            return rest
+    if is_reset(f"figure.{name}\nCtrl+click to type a value, double-click to reset"):
+        return rest
     return moved if changed and math.isfinite(moved) and abs(moved) < 1e9 else value
 
 
@@ -420,12 +391,20 @@ def _draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) ->
     if imgui.begin_child("points", (0.0, 0.0)):
         if not shown:
             imgui.text_disabled("no point name contains this text")
-        clipper = imgui.ListClipper()
-        clipper.begin(len(shown))
-        while clipper.step():
-            for row in shown[clipper.display_start : clipper.display_end]:
-                _draw_row(state, row, layout.names[row], points)
-        clipper.end()
+        for row in (shown[place] for place in visible_rows(len(shown))):
+            name = layout.names[row]
+            imgui.align_text_to_frame_padding()
+            imgui.text_unformatted(printable(name, 40))
+            imgui.same_line(_NAME_WIDTH * imgui.get_content_region_avail().x)
+            confidence = 0.0 if points is None else float(points[row, 3])
+            if confidence <= 0.0:
+                imgui.text_disabled("not detected")
+            else:
+                color = _SEEN if confidence >= state.options.min_confidence else _DOUBTFUL
+                imgui.push_style_color(imgui.Col_.plot_histogram, color)
+                imgui.progress_bar(min(confidence, 1.0), (-1.0, 0.0), f"{confidence:.3g}")
+                imgui.pop_style_color()
+            note_item(state, f"point {name}")
     imgui.end_child()
 
 
@@ -438,19 +417,3 @@ def _seen_text(state: AppState, points: Floats | None) -> str:
     doubtful = int(((confidences > 0.0) & (confidences < least)).sum())
     hidden = f", {doubtful} of them with confidence below {least:g} and not drawn"
     return f"{text}{hidden if doubtful else ''}."
-
-
-def _draw_row(state: AppState, row: int, name: str, points: Floats | None) -> None:
-    """Draw the name of a point, and its confidence as a bar with a number."""
-    imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(printable(name, 40))
-    imgui.same_line(_NAME_WIDTH * imgui.get_content_region_avail().x)
-    confidence = 0.0 if points is None else float(points[row, 3])
-    if confidence <= 0.0:
-        imgui.text_disabled("not detected")
-    else:
-        is_drawn = confidence >= state.options.min_confidence
-        imgui.push_style_color(imgui.Col_.plot_histogram, _SEEN if is_drawn else _DOUBTFUL)
-        imgui.progress_bar(min(confidence, 1.0), (-1.0, 0.0), f"{confidence:.3g}")
-        imgui.pop_style_color()
-    note_item(state, f"point {name}")

@@ -13,8 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.saved_work import SavedPose
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import ViewFrame
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
@@ -25,7 +24,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import Pose, pose_key
-from viewer.rig.posing.pose_record import PoseRecord, record_of
+from viewer.rig.posing.pose_record import record_of
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, figure_pose
@@ -153,21 +152,13 @@ def pause_for_edit(state: AppState) -> None:
     state.say_status(f"{stopped} clip overwrites this pose when the time changes; {kept}")
 
 
-def _record(state: AppState) -> PoseRecord | None:
-    actor = state.actor
-    return (
-        None
-        if actor.pose is None
-        else record_of(actor.figure, actor.pose, actor.shape_space.gender)
-    )
-
-
 def copy_pose(state: AppState) -> None:
     """Copy the chosen actor's pose to the clipboard as JSON."""
     from viewer.formats.pose import pose_text
 
-    record = _record(state)
-    if record is not None:
+    actor = state.actor
+    if actor.pose is not None:
+        record = record_of(actor.figure, actor.pose, actor.shape_space.gender)
         imgui.set_clipboard_text(pose_text(record))
         state.say_status("Pose copied as JSON")
 
@@ -211,16 +202,8 @@ def paste_pose(state: AppState) -> None:
 
 def ask_for_pose(state: AppState) -> None:
     """Ask where to save the chosen actor's pose."""
-    name = f"{file_stem(state.actor.name)}_pose.json"
-    suffixes = FORMATS["pose"].suffixes
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_pose(state, paths[0]),
-        "save",
-        "Save pose: .json, .npz or .txt",
-        suffixes,
-        name,
-    )
+    name, title = f"{file_stem(state.actor.name)}_pose.json", "Save pose: .json, .npz or .txt"
+    ask_where_to_write(state, save_pose, title, FORMATS["pose"].suffixes, name)
 
 
 def save_pose(state: AppState, path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 from imgui_bundle import imgui
 
@@ -11,11 +13,12 @@ from viewer.app.core.text_fields import search_field, whole_field
 from viewer.app.core.theme import faint
 from viewer.app.core.widgets import (
     button,
-    checkbox,
+    draw_setting,
+    is_reset,
     note_item,
     plain_zero,
     same_line_if_room,
-    show_tooltip,
+    visible_rows,
 )
 from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing, pause_for_edit, random_shape, reset_shape
@@ -49,7 +52,13 @@ def draw(state: AppState) -> None:
     if figure.blend_shapes is None or pose is None:
         offer_files(state, "This figure has no blend shapes: open a body model or a .morph file.")
         return
-    _draw_measures(state, figure, pose)
+    # Height, volume and mass are those of the shaped rest body.
+    rest = shaped(figure, pose.shape_weights)
+    for name, value in _measured.get(rest, None, lambda: _measures(rest)):
+        imgui.text_disabled(name)
+        imgui.same_line(imgui.get_font_size() * 5)
+        imgui.text_wrapped(value)
+        note_item(state, f"measured {name}")
     varies = "shape" in figure.blend_shapes.groups
     if varies and button(state, "Random"):
         state.of(Posing).shape_seed += 1
@@ -59,10 +68,13 @@ def draw(state: AppState) -> None:
     if button(state, "Reset shape"):
         reset_shape(state)
     if varies:
-        _draw_seed(state)
+        seed = whole_field(state, begin_field("Seed##seed"), state.of(Posing).shape_seed)
+        note_item(state, "seed")
+        if seed is not None and seed != state.of(Posing).shape_seed:
+            state.of(Posing).shape_seed = max(seed, 0)
+            random_shape(state)
     if figure.correctives is not None:
-        skinning = state.options.skinning
-        skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
+        draw_setting(state, "Pose correctives", state.options.skinning, "correctives")
     imgui.separator()
     if figure.n_shapes > _SEARCHED:
         posing = state.of(Posing)
@@ -70,24 +82,6 @@ def draw(state: AppState) -> None:
     if imgui.begin_child("coefficients", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         _draw_coefficients(state, figure, pose)
     imgui.end_child()
-
-
-def _draw_seed(state: AppState) -> None:
-    seed = whole_field(state, begin_field("Seed##seed"), state.of(Posing).shape_seed)
-    note_item(state, "seed")
-    if seed is not None and seed != state.of(Posing).shape_seed:
-        state.of(Posing).shape_seed = max(seed, 0)
-        random_shape(state)
-
-
-def _draw_measures(state: AppState, figure: Figure, pose: Pose) -> None:
-    """Draw height, volume and mass of the shaped rest body."""
-    rest = shaped(figure, pose.shape_weights)
-    for name, value in _measured.get(rest, None, lambda: _measures(rest)):
-        imgui.text_disabled(name)
-        imgui.same_line(imgui.get_font_size() * 5)
-        imgui.text_wrapped(value)
-        note_item(state, f"measured {name}")
 
 
 def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:
@@ -110,34 +104,21 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     assert shapes is not None  # checked by the caller
     weights = np.zeros(max(shapes.n_shapes, len(pose.shape_weights)))
     weights[: len(pose.shape_weights)] = pose.shape_weights
-    rows = _rows(shapes, state.of(Posing).shape_filter if shapes.n_shapes > _SEARCHED else "")
+    wanted = state.of(Posing).shape_filter.lower() if shapes.n_shapes > _SEARCHED else ""
+    # The headings of groups are rows too, so that long lists can be clipped.
+    rows: list[int | str] = []
+    found = (index for index, name in enumerate(shapes.names) if wanted in name.lower())
+    for group, members in groupby(found, lambda index: shapes.groups[index]):
+        rows += [_HEADINGS.get(group, group), *members]
     longest = imgui.calc_text_size(printable(max(shapes.names, key=len), 40)).x
     column = min(longest, _LABELS * imgui.get_content_region_avail().x)
-    clipper = imgui.ListClipper()
-    clipper.begin(len(rows), imgui.get_frame_height_with_spacing())
-    while clipper.step():
-        for row in rows[clipper.display_start : clipper.display_end]:
-            if isinstance(row, str):
-                imgui.align_text_to_frame_padding()
-                imgui.text_disabled(row)
-            else:
-                if _draw_slider(state, shapes.names[row], row, weights, column):
-                    pose.shape_weights = weights
-    clipper.end()
-
-
-def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
-    """Return the shapes whose names contain a text, below their groups' headings, rows as well."""
-    rows: list[int | str] = []
-    last = ""
-    for index, (name, group) in enumerate(zip(shapes.names, shapes.groups, strict=True)):
-        if wanted.lower() not in name.lower():
-            continue
-        if group != last:
-            rows.append(_HEADINGS.get(group, group))
-            last = group
-        rows.append(index)
-    return rows
+    for place in visible_rows(len(rows), imgui.get_frame_height_with_spacing()):
+        row = rows[place]
+        if isinstance(row, str):
+            imgui.align_text_to_frame_padding()
+            imgui.text_disabled(row)
+        elif _draw_slider(state, shapes.names[row], row, weights, column):
+            pose.shape_weights = weights
 
 
 def _draw_slider(state: AppState, name: str, index: int, weights: Floats, column: float) -> bool:
@@ -162,10 +143,8 @@ def _draw_slider(state: AppState, name: str, index: int, weights: Floats, column
         weights[index] = value - origin
     if unit == _SIGMA:
         _draw_marks()
-    if imgui.is_item_hovered():
-        show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
-        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-            weights[index], changed = state.actor.figure.rest_shape_weights[index], True
+    if is_reset(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset"):
+        weights[index], changed = state.actor.figure.rest_shape_weights[index], True
     return changed
 
 

@@ -49,7 +49,19 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
         _draw_tools(state)
         if state.of(Posing).is_on:
             _draw_settings(state)
-            _draw_actions(state)
+            why = no_pose(state)
+            paste = "paste a pose, even from another figure"
+            rows = (
+                ("Mirror", mirror, with_key(state, "mirror the pose left to right", "M"), why),
+                ("Copy", copy_pose, with_key(state, "copy the pose", "Ctrl+C"), why),
+                ("Paste", paste_pose, with_key(state, paste, "Ctrl+V"), why),
+                ("Key", key_pose_now, "key the pose at the current time", no_keys(state)),
+            )
+            for number, (name, action, text, reason) in enumerate(rows):
+                if number:
+                    imgui.same_line()
+                if _button(state, name, _item_width(len(rows)), text, reason):
+                    action(state)
     rect = overlay_rect(state, "##tools")
     imgui.end()
     return rect
@@ -117,23 +129,6 @@ def _draw_chain(state: AppState) -> None:
         explain("number of joints above the dragged joint that may rotate", why)
     if changed:
         state.of(Posing).chain_length = min(max(length, 1), longest)
-
-
-def _draw_actions(state: AppState) -> None:
-    """Draw the buttons of actions on the whole pose."""
-    why = no_pose(state)
-    paste = "paste a pose, even from another figure"
-    rows = (
-        ("Mirror", mirror, with_key(state, "mirror the pose left to right", "M"), why),
-        ("Copy", copy_pose, with_key(state, "copy the pose", "Ctrl+C"), why),
-        ("Paste", paste_pose, with_key(state, paste, "Ctrl+V"), why),
-        ("Key", key_pose_now, "key the pose at the current time", no_keys(state)),
-    )
-    for number, (name, action, text, reason) in enumerate(rows):
-        if number:
-            imgui.same_line()
-        if _button(state, name, _item_width(len(rows)), text, reason):
-            action(state)
 
 
 def choose_tool(state: AppState, tool: str) -> None:

@@ -86,7 +86,14 @@ def follow_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
 def system_theme() -> str:
     """Return ``"dark"`` or ``"light"``; empty if it cannot be determined."""
     if sys.platform == "win32":
-        return _of_windows()
+        import winreg
+
+        try:
+            with winreg.OpenKey(winreg.HKEY_CURRENT_USER, _PERSONALIZE) as key:  # type: ignore[attr-defined,unused-ignore]
+                value, _ = winreg.QueryValueEx(key, "AppsUseLightTheme")  # type: ignore[attr-defined,unused-ignore]
+        except OSError:
+            return ""
+        return "light" if value else "dark"
     if sys.platform == "darwin":
         # The key exists only while the dark theme is chosen.
         return "dark" if "Dark" in _answer(_DEFAULTS) else "light"
@@ -107,14 +114,3 @@ def _answer(command: tuple[str, ...]) -> str:
     except (OSError, subprocess.TimeoutExpired):
         return ""
     return done.stdout if done.returncode == 0 else ""
-
-
-def _of_windows() -> str:
-    import winreg
-
-    try:
-        with winreg.OpenKey(winreg.HKEY_CURRENT_USER, _PERSONALIZE) as key:  # type: ignore[attr-defined,unused-ignore]
-            value, _ = winreg.QueryValueEx(key, "AppsUseLightTheme")  # type: ignore[attr-defined,unused-ignore]
-    except OSError:
-        return ""
-    return "light" if value else "dark"

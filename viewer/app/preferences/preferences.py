@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Container
-from dataclasses import asdict, field
+from collections.abc import Callable
+from dataclasses import Field, asdict, field, fields
 from pathlib import Path
-from typing import Any, TypeVar
 
 import platformdirs
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES
@@ -21,8 +20,6 @@ THEMES = {"dark": "Dark", "light": "Light", "system": "Follow the system"}
 """Themes with their labels."""
 SCALES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
 """Scales of the interface that can be chosen."""
-FONT_SIZES = (9.0, 36.0)
-"""Minimum and maximum font size, points at scale 1."""
 SAMPLES = (1, 2, 4, 8, 16)
 """Samples per pixel that can be chosen."""
 UPS = {"": "detect from the bodies", "y": "y", "z": "z", "-y": "-y", "-z": "-z"}
@@ -33,20 +30,19 @@ UPS = {"": "detect from the bodies", "y": "y", "z": "z", "-y": "-y", "-z": "-z"}
 class Preferences:
     """The user's preferences; the defaults are those of a new installation."""
 
-    theme: str = "dark"
-    """A key of ``THEMES``."""
-    scale: float = 0.0
+    theme: str = setting("dark", choices=THEMES)
+    scale: float = setting(0.0, choices=(0.0, *SCALES))
     """Scale of the interface; 0 for that of the monitor."""
-    font_size: float = 15.0
+    font_size: float = setting(15.0, limits=(9.0, 36.0), unit="%.0f")
     """Points at scale 1."""
-    in_degrees: bool = True
+    in_degrees: bool = setting(True)
     """Whether angles are shown in degrees instead of radians."""
-    quality: str = "final"
-    """Quality of the view, a key of ``viewer.rendering.options.QUALITIES``."""
-    samples: int = 4
+    quality: str = setting("final", choices=QUALITIES)
+    """Quality of the view."""
+    samples: int = setting(4, choices=SAMPLES)
     """Samples per pixel."""
-    up: str = ""
-    """A key of ``UPS``."""
+    up: str = setting("", choices=UPS)
+    """Up axis of captures and BVH files."""
     keys: dict[str, str] = field(default_factory=dict)
     """Keys that differ from the default: maps names of actions to names of keys."""
 
@@ -74,7 +70,6 @@ class Appearance:
     """Changed keys that are applied."""
 
 
-Value = TypeVar("Value", str, float, int, bool)
 _RENAMED = {
     "want screenshot": "want_screenshot",
     "want open dialog": "ask_for_files",
@@ -89,9 +84,15 @@ def preferences_file() -> Path:
 
 def load_preferences(say: Callable[[str], object] = to_stderr) -> Preferences:
     """Return the stored preferences; the defaults if there are none or they are unreadable."""
-    none: dict[str, Any] = {}
+    none: dict[str, object] = {}
     found = load_kept(preferences_file(), _entries, none, say)
-    preferences = _valid(found)
+    preferences = Preferences(keys=_texts(found.get("keys")))
+    for each in fields(Preferences):
+        value = found.get(each.name)
+        if type(value) is int and type(each.default) is float:
+            value = float(value)
+        if each.metadata and _fits(each, value):
+            setattr(preferences, each.name, value)
     known = asdict(preferences)
     wrong = [name for name in found if name in known and found[name] != known[name]]
     if wrong:
@@ -100,7 +101,7 @@ def load_preferences(say: Callable[[str], object] = to_stderr) -> Preferences:
     return preferences
 
 
-def _entries(data: bytes) -> dict[str, Any]:
+def _entries(data: bytes) -> dict[str, object]:
     found = as_json(data)
     if not isinstance(found, dict):
         raise ValueError("expected an object")
@@ -121,30 +122,14 @@ def _present_name(stored: str) -> str:
     return _RENAMED.get(name, name)
 
 
-def _valid(found: dict[str, Any]) -> Preferences:
-    """Return the valid entries among stored ones, and the defaults of all others."""
-    usual = Preferences()
-    return Preferences(
-        theme=_one_of(found.get("theme"), THEMES, usual.theme),
-        scale=_one_of(found.get("scale"), (0.0, *SCALES), usual.scale),
-        font_size=_between(found.get("font_size"), FONT_SIZES, usual.font_size),
-        in_degrees=_one_of(found.get("in_degrees"), (True, False), usual.in_degrees),
-        quality=_one_of(found.get("quality"), QUALITIES, usual.quality),
-        samples=_one_of(found.get("samples"), SAMPLES, usual.samples),
-        up=_one_of(found.get("up"), UPS, usual.up),
-        keys=_texts(found.get("keys")),
-    )
-
-
-def _one_of(value: Any, known: Container[Value], usual: Value) -> Value:
-    """Return a stored value if it has the right type and is a known value."""
-    fits = type(value) is type(usual) or (type(value) is int and type(usual) is float)
-    return type(usual)(value) if fits and value in known else usual
-
-
-def _between(value: Any, limits: tuple[float, float], usual: float) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number and limits[0] <= value <= limits[1] else usual
+def _fits(each: Field[object], value: object) -> bool:
+    """Return whether a stored value has the type of a field, and is one that the field allows."""
+    if type(value) is not type(each.default):
+        return False
+    if "limits" in each.metadata:
+        low, high = each.metadata["limits"]
+        return isinstance(value, float) and low <= value <= high
+    return value in each.metadata.get("choices", (True, False))
 
 
 def _texts(value: object) -> dict[str, str]:

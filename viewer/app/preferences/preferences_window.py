@@ -8,40 +8,35 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from viewer.app.core.actions import Shortcut
-from viewer.app.core.fields import begin_field, slider_float
+from viewer.app.core.fields import begin_field
 from viewer.app.core.state import AppState
-from viewer.app.core.theme import WARNING, ink
+from viewer.app.core.theme import WARNING, ink, text_color
 from viewer.app.core.widgets import (
     begin_window,
     button,
     choice,
     disabled,
+    draw_setting,
     explain,
     note_item,
     same_line_if_room,
 )
-from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files
-from viewer.app.files.model_menu import set_model_folder
+from viewer.app.files.model_menu import ask_for_model_folder
 from viewer.app.preferences.applying import change, system_theme
 from viewer.app.preferences.key_map import FIXED, chord_name, conflicts, label_of, pressed
 from viewer.app.preferences.preferences import (
     CAPTURED,
-    FONT_SIZES,
     SAMPLES,
     SCALES,
-    THEMES,
-    UPS,
     Appearance,
     Preferences,
 )
 from viewer.models import load_model_folder
 from viewer.phrases import printable
-from viewer.rendering.options import QUALITIES
 
 _TITLE = "Preferences"
 _SIZE = (36.0, 42.0)  # initial size of the window, in font sizes
-_ALWAYS_CLAMP = imgui.SliderFlags_.always_clamp
 _LISTED = 20.0  # height of the list of keys, in rows
 
 
@@ -62,9 +57,25 @@ def draw_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
         imgui.separator_text("Appearance")
         _draw_appearance(state, preferences)
         imgui.separator_text("View")
-        _draw_view(state, preferences)
+        units = {"degrees": "degrees", "radians": "radians"}
+        unit = "degrees" if preferences.in_degrees else "radians"
+        preferences.in_degrees = choice(state, "Angles", unit, units) == "degrees"
+        text = "quality of the view when the program starts; the Display panel changes it"
+        draw_setting(state, "Quality##preferred", preferences, "quality", text)
+        samples = {str(count): f"{count} per pixel" for count in SAMPLES}
+        chosen = choice(state, "Samples##preferred", str(preferences.samples), samples)
+        explain("anti-aliasing; the driver may provide fewer")
+        preferences.samples = int(chosen)
         imgui.separator_text("Files")
-        _draw_files(state, preferences)
+        text = "up axis of captures and BVH files that are opened from now on"
+        draw_setting(state, "Up axis", preferences, "up", text)
+        folder = state.of(Files).model_folder
+        begin_field("Model folder")
+        if button(state, "Choose…##model folder"):
+            ask_for_model_folder(state)
+        explain("folder of body models, which the File menu lists")
+        imgui.same_line()
+        imgui.text_disabled("none" if folder is None else printable(folder, 60))
         imgui.separator_text("Keys")
         _draw_keys(state, preferences, shortcuts)
         why = "" if preferences != Preferences() else "all preferences have their default values"
@@ -85,18 +96,14 @@ def close_preferences(state: AppState) -> None:
 def _draw_appearance(state: AppState, preferences: Preferences) -> None:
     appearance = state.of(Appearance)
     before = preferences.theme
-    preferences.theme = choice(state, "Theme", before, THEMES)
+    draw_setting(state, "Theme", preferences, "theme")
     if preferences.theme == "system" != before:
         appearance.system_theme = system_theme()
     if preferences.theme == "system" and not appearance.system_theme:
         imgui.text_disabled("the theme of this system is unknown: dark is used")
     _draw_scale(state, preferences)
-    changed, size = slider_float(
-        state, begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
-    )
-    note_item(state, "Font size")
-    if changed:
-        preferences.font_size = float(round(size))
+    draw_setting(state, "Font size", preferences, "font_size")
+    preferences.font_size = float(round(preferences.font_size))
 
 
 def _draw_scale(state: AppState, preferences: Preferences) -> None:
@@ -111,32 +118,6 @@ def _draw_scale(state: AppState, preferences: Preferences) -> None:
     explain("automatic follows the scale of the monitor")
 
 
-def _draw_view(state: AppState, preferences: Preferences) -> None:
-    units = {"degrees": "degrees", "radians": "radians"}
-    unit = "degrees" if preferences.in_degrees else "radians"
-    preferences.in_degrees = choice(state, "Angles", unit, units) == "degrees"
-    preferences.quality = choice(state, "Quality##preferred", preferences.quality, QUALITIES)
-    explain("quality of the view when the program starts; the Display panel changes it")
-    samples = {str(count): f"{count} per pixel" for count in SAMPLES}
-    chosen = choice(state, "Samples##preferred", str(preferences.samples), samples)
-    explain("anti-aliasing; the driver may provide fewer")
-    preferences.samples = int(chosen)
-
-
-def _draw_files(state: AppState, preferences: Preferences) -> None:
-    preferences.up = choice(state, "Up axis", preferences.up, UPS)
-    explain("up axis of captures and BVH files that are opened from now on")
-    folder = state.of(Files).model_folder
-    begin_field("Model folder")
-    if button(state, "Choose…##model folder"):
-        state.of(Files).dialog = FileDialog(
-            folder or folder_of(state.paths), set_model_folder, "folder", "Folder of body models"
-        )
-    explain("folder of body models, which the File menu lists")
-    imgui.same_line()
-    imgui.text_disabled("none" if folder is None else printable(folder, 60))
-
-
 def _draw_keys(state: AppState, preferences: Preferences, shortcuts: Sequence[Shortcut]) -> None:
     """Draw the list of keys; a click on a key waits for its replacement."""
     height = _LISTED * imgui.get_text_line_height_with_spacing()
@@ -149,10 +130,8 @@ def _draw_keys(state: AppState, preferences: Preferences, shortcuts: Sequence[Sh
             _draw_key(state, preferences, shortcut, found.get(shortcut.name, ""))
     imgui.end_child()
     if found:
-        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-        count = len(found)
-        imgui.text_unformatted(f"{count} actions share a key: only the first one in the list runs")
-        imgui.pop_style_color()
+        text = f"{len(found)} actions share a key: only the first one in the list runs"
+        imgui.text_colored(ink(WARNING), text)
 
 
 def _draw_key(state: AppState, preferences: Preferences, shortcut: Shortcut, conflict: str) -> None:
@@ -162,12 +141,9 @@ def _draw_key(state: AppState, preferences: Preferences, shortcut: Shortcut, con
     width = 10.0 * imgui.get_font_size()
     why = "this key cannot be changed" if shortcut.label in FIXED else ""
     with disabled(state, why):
-        if conflict:
-            imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-        pressed_button = imgui.button(f"{label}###key {name}", (width, 0.0))
+        with text_color(WARNING if conflict else None):
+            pressed_button = imgui.button(f"{label}###key {name}", (width, 0.0))
         note_item(state, f"key {name}")
-        if conflict:
-            imgui.pop_style_color()
         explain(f"also: {conflict}" if conflict else "click, then press another key", why)
     if pressed_button and not why:
         appearance.captured = "" if waits else name

@@ -19,14 +19,14 @@ from viewer.app.core.widgets import (
     checkbox,
     choice,
     count_slider,
+    draw_setting,
     explain,
     note_item,
 )
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
-from viewer.data_classes import dataclass
+from viewer.app.files.files import ask_where_to_write
+from viewer.data_classes import dataclass, setting
 from viewer.formats import file_stem
-from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS
+from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
 from viewer.phrases import counted
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
@@ -47,6 +47,7 @@ _SIZES = {
     "1080x1920": "upright: 1080 x 1920",
     "own": "custom",
 }
+_LOOKS = {"": "as the view, but at most Normal for motions", **QUALITIES}
 _SAMPLES = {"0": "as the view", "1": "1", "4": "4", "8": "8", "16": "16"}
 _BACKGROUNDS = {
     "": "as the view",
@@ -60,15 +61,11 @@ _WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
 KINDS = {
-    ".mp4": "MP4 video (H.264)",
-    ".webm": "WebM video (VP9)",
-    ".gif": "Animated GIF",
+    **{suffix: f"{kind.title[0].upper()}{kind.title[1:]}" for suffix, kind in VIDEOS.items()},
     "pictures": "Numbered pictures (PNG)",
     "sheet": "Contact sheet (PNG)",
 }
 """Kinds of recordings, with their labels."""
-_VIDEO_KINDS = (".mp4", ".webm", ".gif")
-"""Kinds that are a video file, by its suffix."""
 _LEAST_PIXELS = 16
 """Minimum width and height of a recording."""
 _WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
@@ -78,10 +75,8 @@ _WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
 class RecordSettings:
     """Settings of a recording."""
 
-    kind: str = ".mp4"
-    """A key of ``KINDS``."""
-    size: str = "view"
-    """A key of the available sizes."""
+    kind: str = setting(".mp4", choices=KINDS)
+    size: str = setting("view", choices=_SIZES)
     own_size: tuple[int, int] = SIZE
     """Width and height for the size ``"own"``."""
     rate: float = 0.0
@@ -92,11 +87,10 @@ class RecordSettings:
     """Duration of the orbit if there is no motion."""
     n_cells: int = 12
     """Number of frames in a contact sheet."""
-    quality: int = int(QUALITY)
-    """Quality of the compression of videos, 0 to 100."""
-    look: str = ""
-    """Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of the
-    view, or normal if the view is final and there are several frames."""
+    quality: int = setting(int(QUALITY), limits=(0, 100))
+    """Quality of the compression of videos."""
+    look: str = setting("", choices=_LOOKS)
+    """Quality of the images."""
     samples: int = 0
     """Samples per pixel; 0 for those of the view."""
     background: str = ""
@@ -211,7 +205,10 @@ def draw_record_dialog(state: AppState) -> None:
         # The buttons stay visible even if the settings need a scroll bar.
         if imgui.begin_child("##settings", (0.0, -1.2 * imgui.get_frame_height_with_spacing())):
             _draw_preview(state, settings)
-            _draw_file(state, settings)
+            draw_setting(state, "Kind", settings, "kind")
+            if settings.kind in (".mp4", ".webm"):
+                text = "higher quality results in larger files"
+                draw_setting(state, "Compression quality###Quality", settings, "quality", text)
             imgui.separator_text("Picture")
             _draw_picture(state, settings)
             imgui.separator_text("Frames")
@@ -243,26 +240,14 @@ def _draw_preview(state: AppState, settings: RecordSettings) -> None:
     note_item(state, "preview")
 
 
-def _draw_file(state: AppState, settings: RecordSettings) -> None:
-    """Draw the choice of the format, and the settings of that format."""
-    settings.kind = choice(state, "Kind", settings.kind, KINDS)
-    if settings.kind in (".mp4", ".webm"):
-        settings.quality = count_slider(
-            state, "Compression quality###Quality", settings.quality, (0, 100)
-        )
-        settings.quality = min(max(settings.quality, 0), 100)
-        explain("higher quality results in larger files")
-
-
 def _draw_picture(state: AppState, settings: RecordSettings) -> None:
-    settings.size = choice(state, "Size", settings.size, _SIZES)
+    draw_setting(state, "Size", settings, "size")
     if settings.size == "own":
         size = _pair_field(state, "Pixels", settings.own_size)
         if size is not None:
             width, height = (min(max(side, _LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
-    looks = {"": "as the view, but at most Normal for motions", **QUALITIES}
-    settings.look = choice(state, "Quality##look", settings.look, looks)
+    draw_setting(state, "Quality##look", settings, "look")
     chosen = choice(state, "Samples##recorded", str(settings.samples), _SAMPLES)
     settings.samples = int(chosen)
     backgrounds = dict(_BACKGROUNDS)
@@ -291,8 +276,7 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
             settings.rate = _within(state, rate, 0.01, 1000.0)
     if clock.has_motion:
         _draw_range(state, settings)
-    settings.turntable = checkbox(state, "Turntable", settings.turntable)
-    explain("orbit once around the scene")
+    draw_setting(state, "Turntable", settings, "turntable", "orbit once around the scene")
     if settings.turntable and not clock.has_motion:
         field = begin_field("Seconds")
         seconds = number_field(state, field, settings.seconds, "%.2f s")
@@ -361,18 +345,15 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
-    suffixes = (".png",) if settings.kind in names else _VIDEO_KINDS
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths), _start, "save", f"Record: {KINDS[settings.kind]}",
-        suffixes, name,
-    )  # fmt: skip
+    suffixes = (".png",) if settings.kind in names else tuple(VIDEOS)
+    ask_where_to_write(state, _start, f"Record: {KINDS[settings.kind]}", suffixes, name)
 
 
-def _start(state: AppState, paths: list[Path]) -> None:
-    recording, suffix = state.of(RecordingState), paths[0].suffix.lower()
-    if recording.settings is not None and {suffix, recording.settings.kind} <= {*_VIDEO_KINDS}:
+def _start(state: AppState, path: Path) -> None:
+    recording, suffix = state.of(RecordingState), path.suffix.lower()
+    if recording.settings is not None and {suffix, recording.settings.kind} <= {*VIDEOS}:
         recording.settings.kind = suffix  # the user typed a different suffix
-    recording.wanted = paths[0]
+    recording.wanted = path
 
 
 def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:

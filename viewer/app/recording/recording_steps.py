@@ -70,7 +70,23 @@ def _recording_steps(
     ghost: Ghost | None = None,
 ) -> Generator[object, None, list[str]]:
     """Record the playback range; ``{frame}`` in the path stands for the number of an image."""
-    recording = _recording(state, settings)
+    times, numbers, rate = recorded_times(state, settings)
+    recording = Recording(
+        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
+        times,
+        state.camera.copy(),
+        settings.pixels((state.view_rect[2], state.view_rect[3])),
+        recorded_options(state, settings, len(times)),
+        numbers=numbers,
+        rate=rate,
+        box=state.box.copy(),
+        moves=state.clock.has_motion,
+        interpolate=state.clock.interpolate_gaps,
+        turntable=_FULL if settings.turntable else 0.0,
+        follow=recorded_follow(state, settings),
+        selected=(state.chosen_actor, state.selected_joint),
+        annotations=RecordedMarks(state).at,
+    )
     files = [path]
     if settings.kind == "pictures":
         files = _numbered(path, recording.numbers)
@@ -96,27 +112,6 @@ def _recording_steps(
     notes = [*getattr(sink, "notes", []), *renderer.notes]
     width, height = recording.size
     return [f"Saved {name}: {recording.n_frames} frames, {width} x {height}", *notes]
-
-
-def _recording(state: AppState, settings: RecordSettings) -> Recording:
-    """Return the parameters of a recording of the view, without tools and panels."""
-    times, numbers, rate = recorded_times(state, settings)
-    return Recording(
-        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
-        times,
-        state.camera.copy(),
-        settings.pixels((state.view_rect[2], state.view_rect[3])),
-        recorded_options(state, settings, len(times)),
-        numbers=numbers,
-        rate=rate,
-        box=state.box.copy(),
-        moves=state.clock.has_motion,
-        interpolate=state.clock.interpolate_gaps,
-        turntable=_FULL if settings.turntable else 0.0,
-        follow=recorded_follow(state, settings),
-        selected=(state.chosen_actor, state.selected_joint),
-        annotations=RecordedMarks(state).at,
-    )
 
 
 def _numbered(path: Path, numbers: Sequence[int]) -> list[Path]:

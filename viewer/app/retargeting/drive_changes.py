@@ -69,7 +69,8 @@ def change_drive(
         for number, (actor, drive) in enumerate(work):
             span = number / len(work), (number + 1) / len(work)
             with part_of_work(f"Retargeting {printable(actor.title, 60)}", span):
-                changed.append(_retargeted(actor, drive))
+                clip = driven_clip(drive, actor.figure)[0]
+                changed.append(clip if drive.finish is None else drive.finish(clip))
 
     def finish() -> None:
         if state.scene is not scene:
@@ -103,12 +104,6 @@ def _is_together(actor: Actor, first: Actor) -> bool:
         return False
     is_same = actor.figure is first.figure and actor.title == first.title
     return is_same and actor.drive.joint_map is first.drive.joint_map
-
-
-def _retargeted(actor: Actor, drive: Drive) -> SampledClip:
-    """Return the motion of an actor retargeted by a changed drive."""
-    clip = driven_clip(drive, actor.figure)[0]
-    return clip if drive.finish is None else drive.finish(clip)
 
 
 def plants_feet(state: AppState) -> bool:

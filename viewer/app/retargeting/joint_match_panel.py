@@ -21,9 +21,10 @@ from viewer.app.core.widgets import (
     explain,
     note_item,
     same_line_if_room,
+    visible_rows,
+    warning,
 )
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import ask_for_files, ask_where_to_write
 from viewer.app.files.saving import save_files
 from viewer.app.retargeting.drive_changes import NOT_DRIVEN, change_drive, no_edit, shown_drive
 from viewer.data_classes import dataclass
@@ -142,45 +143,34 @@ def draw(state: AppState) -> None:
     hovered = state.of(JointMatch).hovered
     state.of(JointMatch).hovered = set(), set()
     if imgui.begin_child("##matches", table):
-        _draw_buttons(state, shown)
+        view = state.of(JointMatch)
+        text = f"{shown.n_driven} of {counted(len(shown.target.joints), 'joint')} driven"
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(text)
+        if shown.unused:
+            same_line_if_room(f"{len(shown.unused)} unused")
+            imgui.text_colored(ink(WARNING), f"{len(shown.unused)} unused")
+            names = [shown.source.labels[joint] for joint in shown.unused]
+            explain(f"joints of the motion that drive nothing: {printable(', '.join(names), 1000)}")
+        if state.actor.clip is None:
+            warning(NOT_DRIVEN)
+        for label, act, why, what in _BUTTONS:
+            same_line_if_room(label)
+            if button(state, label, why(state)):
+                act(state)
+            explain(what)
+        width = imgui.calc_text_size("Only unmatched").x + 2.0 * imgui.get_frame_height()
+        imgui.set_next_item_width(max(imgui.get_content_region_avail().x - width, width))
+        view.filter = search_field("##match filter", view.filter, "Filter joints")
+        note_item(state, "Filter joints")
+        imgui.same_line()
+        view.only_unmatched = checkbox(state, "Only unmatched", view.only_unmatched)
         _draw_table(state, shown, hovered[0])
     imgui.end_child()
     if is_wide:
         imgui.same_line()
     left = imgui.get_content_region_avail()
     _draw_preview(state, shown, (left.x, left.y))
-
-
-def _draw_buttons(state: AppState, shown: _Shown) -> None:
-    view = state.of(JointMatch)
-    text = f"{shown.n_driven} of {counted(len(shown.target.joints), 'joint')} driven"
-    imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(text)
-    if shown.unused:
-        same_line_if_room(f"{len(shown.unused)} unused")
-        imgui.text_colored(ink(WARNING), f"{len(shown.unused)} unused")
-        names = [shown.source.labels[joint] for joint in shown.unused]
-        explain(f"joints of the motion that drive nothing: {printable(', '.join(names), 1000)}")
-    if state.actor.clip is None:
-        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-        imgui.text_wrapped(NOT_DRIVEN)
-        imgui.pop_style_color()
-    for label, act, why, what in (
-        ("Automatic", match_automatically, is_automatic(state), "match all joints automatically"),
-        ("Load map…", ask_for_map, no_edit(state), "match the joints as in a joint map file"),
-        ("Save map…", ask_where_to_save, "", "write the match as a text file, to edit or load it"),
-    ):
-        same_line_if_room(label)
-        if button(state, label, why):
-            act(state)
-        if not why:
-            explain(what)
-    width = imgui.calc_text_size("Only unmatched").x + 2.0 * imgui.get_frame_height()
-    imgui.set_next_item_width(max(imgui.get_content_region_avail().x - width, width))
-    view.filter = search_field("##match filter", view.filter, "Filter joints")
-    note_item(state, "Filter joints")
-    imgui.same_line()
-    view.only_unmatched = checkbox(state, "Only unmatched", view.only_unmatched)
 
 
 def _draw_table(state: AppState, shown: _Shown, hovered: set[int]) -> None:
@@ -196,19 +186,15 @@ def _draw_table(state: AppState, shown: _Shown, hovered: set[int]) -> None:
     imgui.table_setup_column("Joint of the motion", imgui.TableColumnFlags_.width_stretch, 0.42)
     imgui.table_setup_column("Matched by", imgui.TableColumnFlags_.width_stretch, 0.22)
     imgui.table_headers_row()
-    clipper = imgui.ListClipper()
-    clipper.begin(len(rows))
     view = state.of(JointMatch)
-    if view.scrolls_to in rows:
-        clipper.include_item_by_index(rows.index(view.scrolls_to))
-    while clipper.step():
-        for row in range(clipper.display_start, clipper.display_end):
-            imgui.push_id(rows[row])
-            if rows[row] == view.scrolls_to:
-                imgui.set_scroll_here_y(0.5)
-                view.scrolls_to = -1
-            _draw_row(state, shown, rows[row], rows[row] in hovered)
-            imgui.pop_id()
+    wanted = rows.index(view.scrolls_to) if view.scrolls_to in rows else -1
+    for row in visible_rows(len(rows), wanted=wanted):
+        imgui.push_id(rows[row])
+        if rows[row] == view.scrolls_to:
+            imgui.set_scroll_here_y(0.5)
+            view.scrolls_to = -1
+        _draw_row(state, shown, rows[row], rows[row] in hovered)
+        imgui.pop_id()
     imgui.end_table()
 
 
@@ -342,13 +328,10 @@ def _hover(state: AppState, shown: _Shown, placed: list[Floats]) -> None:
     elif number == 1:
         view.hovered = set(shown.driven.get(joint, ())), {joint}
     chosen = sorted(view.hovered[0]) if number >= 0 else []
-    if chosen and imgui.is_mouse_released(imgui.MouseButton_.left) and not _was_dragged():
-        state.selected_joint = view.scrolls_to = chosen[0]
-
-
-def _was_dragged() -> bool:
     delta = imgui.get_mouse_drag_delta(imgui.MouseButton_.left)
-    return bool(abs(delta.x) + abs(delta.y) > imgui.get_io().mouse_drag_threshold)
+    was_dragged = abs(delta.x) + abs(delta.y) > imgui.get_io().mouse_drag_threshold
+    if chosen and imgui.is_mouse_released(imgui.MouseButton_.left) and not was_dragged:
+        state.selected_joint = view.scrolls_to = chosen[0]
 
 
 def _placed(side: _Side, yaw: float, box: _Box) -> Floats:
@@ -422,26 +405,23 @@ def shown_match(state: AppState) -> _Shown | None:
     shown = view.shown
     if shown is None or shown.drive is not drive or shown.figure is not figure:
         is_other = shown is None or shown.drive.motion is not drive.motion
-        shown = view.shown = _match(drive, figure)
+        matches = matches_of(drive, figure)
+        driven: dict[int, list[int]] = {}
+        for joint, partner in enumerate(matches.partners.tolist()):
+            if partner >= 0:
+                driven.setdefault(partner, []).append(joint)
+        source, target = aligned_rests(drive, figure)
+        mine = target @ front_axes(target, matches, figure.up, is_source=False).T
+        theirs = source @ front_axes(source, matches, figure.up, is_source=True).T
+        sides = _side(figure, mine), _side(drive.motion.figure, theirs)
+        shown = view.shown = _Shown(
+            drive, figure, *sides, matches.partners, matches.origins, driven
+        )
         if is_other:
             lengths = np.ptp(shown.target.points, axis=0)
             view.yaw = _SIDE_VIEW if lengths[2] > _LONG * lengths[0] else 0.0
             view.filter, view.only_unmatched = "", False
     return shown
-
-
-def _match(drive: Drive, figure: Figure) -> _Shown:
-    """Return the match of a drive with a figure."""
-    matches = matches_of(drive, figure)
-    driven: dict[int, list[int]] = {}
-    for joint, partner in enumerate(matches.partners.tolist()):
-        if partner >= 0:
-            driven.setdefault(partner, []).append(joint)
-    source, target = aligned_rests(drive, figure)
-    mine = target @ front_axes(target, matches, figure.up, is_source=False).T
-    theirs = source @ front_axes(source, matches, figure.up, is_source=True).T
-    sides = _side(figure, mine), _side(drive.motion.figure, theirs)
-    return _Shown(drive, figure, *sides, matches.partners, matches.origins, driven)
 
 
 def _side(figure: Figure, points: Floats) -> _Side:
@@ -482,17 +462,13 @@ def match_automatically(state: AppState) -> None:
 
 def ask_for_map(state: AppState) -> None:
     """Open the dialog that loads a joint map."""
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths), _load, "open", "Load joint map", _SUFFIXES, is_single=True
-    )
+    ask_for_files(state, _load, "Load joint map", _SUFFIXES, is_single=True)
 
 
 def ask_where_to_save(state: AppState) -> None:
     """Open the dialog that saves the match as a joint map."""
     name = f"{file_stem(state.actor.figure.name)}_joints{_SUFFIXES[0]}"
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths), _save, "save", "Save joint map", _SUFFIXES, name
-    )
+    ask_where_to_write(state, _save, "Save joint map", _SUFFIXES, name)
 
 
 def _load(state: AppState, paths: list[Path]) -> None:
@@ -510,7 +486,7 @@ def _load(state: AppState, paths: list[Path]) -> None:
     _apply(state, joint_map, lambda: state.say_status(text))
 
 
-def _save(state: AppState, paths: list[Path]) -> None:
+def _save(state: AppState, path: Path) -> None:
     """Write the match of the chosen figure."""
     actor = state.actor
     drive = shown_drive(state, actor)
@@ -520,9 +496,22 @@ def _save(state: AppState, paths: list[Path]) -> None:
     titles = drive.motion.figure.name, actor.figure.name
 
     def act() -> None:
-        write_joint_map(full_map(drive, actor.figure), paths[0], titles)
+        write_joint_map(full_map(drive, actor.figure), path, titles)
 
-    save_files(state, act, paths, saved=drive.joint_map)
+    save_files(state, act, [path], saved=drive.joint_map)
+
+
+_BUTTONS = (
+    ("Automatic", match_automatically, is_automatic, "match all joints automatically"),
+    ("Load map…", ask_for_map, no_edit, "match the joints as in a joint map file"),
+    (
+        "Save map…",
+        ask_where_to_save,
+        lambda _: "",
+        "write the match as a text file, to edit or load it",
+    ),
+)
+"""Buttons of the panel: label, action, reason why it is disabled, and tooltip."""
 
 
 def _apply(state: AppState, joint_map: JointMap | None, tell: Callable[[], None]) -> None:

@@ -101,21 +101,19 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
     """Move the template; the error of the new placement is still unknown."""
     own, before = current_template(state), placing_now(state)
     assert own is not None  # only an existing template can be moved
-    fitted = template if before is not None and before.fitted is template else None
+    fitted: Template | None = None
+    kept: tuple[Diagnostic, ...] = ()
+    if before is not None and before.fitted is template:
+        fitted, kept = template, tuple(line for line in before.lines if line.key in _DONE)
     state.of(Rigging).placing = Placing(
         similarity=similarity,
         alignment=None,
         settings=AlignmentSettings(matrix=similarity.matrix),
         fitted=fitted,
-        lines=_still_true(before.lines) if before is not None and fitted is not None else (),
+        lines=kept,
         meshes=(target_mesh(state), own.figure),
         pose=pose_key(own.pose),
     )
-
-
-def _still_true(lines: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """Return the messages about the fit of the template, except its distance from the target."""
-    return tuple(line for line in lines if line.key in _DONE)
 
 
 def set_aside(state: AppState) -> None:

@@ -12,18 +12,18 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
-from viewer.app.core.theme import WARNING, ink
+from viewer.app.core.theme import WARNING, text_color
 from viewer.app.core.widgets import (
     button,
     checkbox,
     explain,
     key_name,
     note_item,
+    radio,
     same_line_if_room,
     with_key,
 )
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Comparison, Result, Rigging, no_results
@@ -33,7 +33,7 @@ from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Ints
 from viewer.rig.comparison.pairs import Pairs, row_distances
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.clip import Channel, Clip
@@ -268,17 +268,12 @@ def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     # The clip sets the same DOFs as the template's; the target's rotation is not part of it.
     actor.pose = figure_pose(rigged.figure)
     actor.offset = result.template.actor.offset if result.template.actor else 0.0
-    actor.placement = place @ _template_space(result)
-
-
-def _template_space(result: Result) -> Floats:
-    """Return the matrix from the template's space to the target's, without scale: (4, 4)."""
-    alignment = result.rigged.alignment
-    if alignment is None:
-        return result.rigged.placement
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = alignment.similarity.rotation, alignment.similarity.shift
-    return matrix
+    # From the template's space to the target's, without scale.
+    matrix, alignment = rigged.placement, rigged.alignment
+    if alignment is not None:
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = alignment.similarity.rotation, alignment.similarity.shift
+    actor.placement = place @ matrix
 
 
 def _save_rigged(state: AppState, result: Result, path: Path) -> None:
@@ -326,19 +321,24 @@ def draw_results(state: AppState) -> None:
     if why or result is None:
         imgui.text_wrapped(f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it.")
         return
-    _draw_versions(state)
+    shown = _shown_version(state)
+    for number, name in enumerate(_versions(state)):
+        text = "original" if name == TARGET else name
+        if number:
+            same_line_if_room(text)
+        label, tip = f"{text}###version {name}", with_key(state, "cycle through the versions", "A")
+        if radio(state, label, name == shown, f"version {name}", tip) and name != shown:
+            _show_version(state, name)
     _draw_colors(state)
     moves = plays_motion(result)
     still = _no_motion_of(result)
     plays = checkbox(state, "Move like the template", moves, still)
-    if not still:
-        explain("play the template's motion at the target's position")
+    explain("play the template's motion at the target's position")
     if plays != moves:
         _set_motion(state, result, plays)
     tries, still = plays_trial(result), _no_trial_of(result)
     chosen = checkbox(state, "Trial motion", tries, still)
-    if not still:
-        explain("bend each joint in both directions, to see how the weights deform the mesh")
+    explain("bend each joint in both directions, to see how the weights deform the mesh")
     if chosen != tries:
         _set_trial(state, result, chosen)
     _draw_table(state)
@@ -348,20 +348,13 @@ def draw_results(state: AppState) -> None:
     if button(state, "Copy report"):
         imgui.set_clipboard_text("\n".join(line.labelled for line in result.rigged.lines))
         state.say_status("Report copied")
-    _draw_lines(state, result)
-
-
-def _draw_versions(state: AppState) -> None:
-    """Draw the target and its results as radio buttons; the key A cycles through them."""
-    shown = _shown_version(state)
-    for number, name in enumerate(_versions(state)):
-        text = "original" if name == TARGET else name
-        if number:
-            same_line_if_room(text)
-        if imgui.radio_button(f"{text}###version {name}", name == shown) and name != shown:
-            _show_version(state, name)
-        note_item(state, f"version {name}")
-        explain(with_key(state, "cycle through the versions", "A"))
+    height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
+    if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
+        for line in result.rigged.lines:
+            with text_color(WARNING if line.severity == "warning" else None):
+                imgui.text_wrapped(printable(line.labelled, 400))
+    imgui.end_child()
+    note_item(state, "report")
 
 
 def _draw_colors(state: AppState) -> None:
@@ -371,9 +364,8 @@ def _draw_colors(state: AppState) -> None:
         if number:
             same_line_if_room(text)
         is_on = now == view if view else now not in _RESULT_COLORS
-        if imgui.radio_button(f"{text}###color {view}", is_on):
+        if radio(state, f"{text}###color {view}", is_on, f"color {view}"):
             show_colors(state, view)
-        note_item(state, f"color {view}")
 
 
 def _draw_table(state: AppState) -> None:
@@ -421,28 +413,12 @@ def _table_row(title: str, meaning: str, cells: list[str]) -> None:
         explain(meaning)
 
 
-def _draw_lines(state: AppState, result: Result) -> None:
-    """Draw the report, with warnings highlighted."""
-    height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
-    if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
-        for line in result.rigged.lines:
-            warns = line.severity == "warning"
-            if warns:
-                imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-            imgui.text_wrapped(printable(line.labelled, 400))
-            if warns:
-                imgui.pop_style_color()
-    imgui.end_child()
-    note_item(state, "report")
-
-
 def ask_where_to_save_rig(state: AppState, result: Result) -> None:
     """Ask where to save a rigged mesh."""
     name = f"{file_stem(result.target.name)}_rigged.npz"
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: _save_rigged(state, result, paths[0]),
-        "save",
+    ask_where_to_write(
+        state,
+        lambda state, path: _save_rigged(state, result, path),
         "Save rigged mesh: .npz, .glb, or .skel with .skin, .obj and .json",
         RIGGED_SUFFIXES,
         name,

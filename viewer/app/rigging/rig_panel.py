@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
@@ -13,7 +12,6 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field
-from viewer.app.core.theme import WARNING, ink
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -23,11 +21,12 @@ from viewer.app.core.widgets import (
     explain,
     note_item,
     plain_zero,
+    radio,
     same_line_if_room,
     slider,
+    warning,
 )
-from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import ask_for_files
 from viewer.app.rigging.placing import (
     aligned_template,
     box_fit,
@@ -41,7 +40,6 @@ from viewer.app.rigging.results import MATCH_COLORS, draw_results, show_colors
 from viewer.app.rigging.rigging import (
     GHOSTS,
     TOOLS,
-    Placing,
     RigChoices,
     Rigging,
     Template,
@@ -143,17 +141,16 @@ def _draw_sources(state: AppState) -> None:
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
     if button(state, "Add mesh…", why):
-        _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES, is_single=True)
-    if not why:
-        explain("add a mesh without a rig to this scene")
+        title = f"Add a mesh to rig: {', '.join(MESHES)}"
+        ask_for_files(state, start_adding, title, MESHES, is_single=True)
+    explain("add a mesh without a rig to this scene")
     with disabled(state, why):
         key = choice(state, "Template", view.template_key, template_texts(state))
     if key != view.template_key:
         choose_template(state, key)
     if button(state, "Template file…", why):
-        _ask(state, _read_template, "Template: any rigged figure", ())
-    if not why:
-        explain("any figure that can be opened: a body model, .npz, or .skel and .skin together")
+        ask_for_files(state, start_reading, "Template: any rigged figure")
+    explain("any figure that can be opened: a body model, .npz, or .skel and .skin together")
     template = current_template(state)
     # A template that has not been read yet has the same controls, so that buttons do not move.
     if template is None or template.actor is None:
@@ -164,39 +161,16 @@ def _draw_sources(state: AppState) -> None:
                 start_reading(state, then=_add_template)
             else:
                 _add_template(state)
-        if not refuses:
-            explain("add the template next to the target in order to pose it like the target")
+        explain("add the template next to the target in order to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
-    imgui.text_disabled(_template_text(template))
+    text = "read on first use"
+    if template is not None:
+        n_joints = template.figure.require_skeleton().n_joints
+        n_vertices = template.figure.require_mesh().n_vertices
+        pose = "in its current pose" if template.actor is not None else "in its file's pose"
+        text = f"{n_joints} joints, {n_vertices:,} vertices, {pose}"
+    imgui.text_disabled(text)
     imgui.pop_text_wrap_pos()
-
-
-def _template_text(template: Template | None) -> str:
-    """Return a description of the template."""
-    if template is None:
-        return "read on first use"
-    skeleton, mesh = template.figure.skeleton, template.figure.mesh
-    assert skeleton is not None and mesh is not None  # templates have a mesh and a skeleton
-    pose = "in its current pose" if template.actor is not None else "in its file's pose"
-    return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
-
-
-def _ask(
-    state: AppState, done: object, title: str, suffixes: tuple[str, ...], is_single: bool = False
-) -> None:
-    assert callable(done)
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths), done, "open", title, suffixes, is_single=is_single
-    )
-
-
-def _add_mesh(state: AppState, paths: list[Path]) -> None:
-    start_adding(state, paths[0])
-
-
-def _read_template(state: AppState, paths: list[Path]) -> None:
-    """Read the template from files that were chosen."""
-    start_reading(state, tuple(paths))
 
 
 def _add_template(state: AppState) -> None:
@@ -238,13 +212,9 @@ def _draw_match(state: AppState) -> None:
         return
     same_line_if_room("100.0 % of the vertices match")
     imgui.text_unformatted(f"{100.0 * view.match_fraction:.1f} % of the vertices match")
-    _draw_colors(state, MATCH_COLORS, "Colours")
-
-
-def _draw_colors(state: AppState, views: dict[str, str], label: str) -> None:
     options = state.options
-    now = options.scalar if options.shading == "scalar" and options.scalar in views else ""
-    chosen = choice(state, label, now, {"": "none", **views})
+    now = options.scalar if options.shading == "scalar" and options.scalar in MATCH_COLORS else ""
+    chosen = choice(state, "Colours", now, {"": "none", **MATCH_COLORS})
     if chosen != now:
         show_colors(state, chosen)
 
@@ -258,13 +228,11 @@ def _draw_run(state: AppState) -> None:
     why = no_job_room(state)
     if button(state, "Run", why):
         start_run(state, (choices.method,))
-    if not why:
-        explain("rig the target; aligns the template first if necessary")
+    explain("rig the target; aligns the template first if necessary")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
         start_run(state, tuple(METHODS))
-    if not why:
-        explain("run both methods; A cycles through the original mesh and both results")
+    explain("run both methods; A cycles through the original mesh and both results")
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
@@ -276,11 +244,6 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
     note_item(state, "rig advanced")
     if not opened:
         return
-    _draw_advanced_choices(state, choices)
-    imgui.tree_pop()
-
-
-def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(state, why):
         choices.refines = checkbox(state, "Refine alignment", choices.refines)
@@ -302,6 +265,7 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         choices.max_influences = max(most, 0)
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("transfer the template's pose correctives, if any", why)
+    imgui.tree_pop()
 
 
 def _draw_alignment(state: AppState) -> None:
@@ -318,17 +282,25 @@ def _draw_alignment(state: AppState) -> None:
     explain("rotate the template's joints and resize its limbs where the target differs")
     if button(state, "Align", why):
         start_align(state)
-    if not why:
-        explain(f"find the best placement by closest points{_FITS if choices.fits else ''}")
+    explain(f"find the best placement by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
         _refine(state)
-    if not refuses:
-        explain(f"from its current placement, by closest points{_POSES if choices.fits else ''}")
-    _draw_placing(placing_now(state))
+    explain(f"from its current placement, by closest points{_POSES if choices.fits else ''}")
+    placing = placing_now(state)
+    if placing is None:
+        imgui.text_disabled("not aligned yet")
+    else:
+        _draw_error(placing.alignment)
     rigging.ghost = choice(state, "Template shown", rigging.ghost, GHOSTS)
-    _draw_tools(state)
+    imgui.text_disabled("By hand")
+    for number, (tool, (name, text)) in enumerate(TOOLS.items()):
+        if number:
+            same_line_if_room(name)
+        label = f"{name}###rig tool {tool}"
+        if radio(state, label, rigging.tool == tool, f"rig tool {tool}", text):
+            choose_rig_tool(state, tool)
     template = aligned_template(state)
     if template is not None and rigging.tool not in ("", "landmarks"):
         _draw_numbers(state, template)
@@ -342,37 +314,24 @@ def _draw_alignment(state: AppState) -> None:
         imgui.text_wrapped("the template was posed after the alignment: align it again")
 
 
-def _draw_placing(placing: Placing | None) -> None:
-    """Draw the distance between the aligned template and the target."""
-    if placing is None:
-        imgui.text_disabled("not aligned yet")
-        return
-    _draw_error(placing.alignment)
-
-
 def _draw_error(found: Alignment | None) -> None:
     """Draw the error, a trimmed RMS as in the report."""
     if found is None:
         imgui.text_disabled("error: not measured at this placement")
         return
-    text = f"error {100.0 * found.error:.2f} % ({_method_text(found)})"
+    # With fitted limbs, there is only one scale.
+    scales = found.similarity.factors, found.similarity.own_factors
+    is_even = all((factors == 1.0).all() for factors in scales)
+    how = _METHODS[found.how] if found.how != "fit" or is_even else _STRETCHED
+    text = f"error {100.0 * found.error:.2f} % ({how})"
     if found.error > _DOUBTFUL:
-        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
-        imgui.text_wrapped(f"{text}: doubtful")
-        imgui.pop_style_color()
+        warning(f"{text}: doubtful")
     else:
         imgui.text_wrapped(text)
     explain(
         "RMS distance of the best 90 % of the target from the template, relative to the target's "
         f"size; distance of the template from the target: {100.0 * found.away:.2f} %"
     )
-
-
-def _method_text(found: Alignment) -> str:
-    """Return the label of an alignment method; with fitted limbs, there is only one scale."""
-    scales = found.similarity.factors, found.similarity.own_factors
-    is_even = all((factors == 1.0).all() for factors in scales)
-    return _METHODS[found.how] if found.how != "fit" or is_even else _STRETCHED
 
 
 def _refine(state: AppState) -> None:
@@ -386,18 +345,6 @@ def _refine(state: AppState) -> None:
     corners[1:] += (high == low) * np.eye(3)  # keeps the four corners of flat meshes distinct
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
     start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
-
-
-def _draw_tools(state: AppState) -> None:
-    """Draw the choice of a tool to move the template in the view."""
-    imgui.text_disabled("By hand")
-    for number, (tool, (name, text)) in enumerate(TOOLS.items()):
-        if number:
-            same_line_if_room(name)
-        if imgui.radio_button(f"{name}###rig tool {tool}", state.of(Rigging).tool == tool):
-            choose_rig_tool(state, tool)
-        note_item(state, f"rig tool {tool}")
-        explain(text)
 
 
 def _draw_numbers(state: AppState, template: Template) -> None:

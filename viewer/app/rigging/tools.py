@@ -16,7 +16,7 @@ from imgui_bundle import imgui, imguizmo
 from viewer.app.core.camera_moves import fit_points
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.core.view_frame import ViewFrame, view_frame
+from viewer.app.core.view_frame import view_frame
 from viewer.app.posing.posing import Posing
 from viewer.app.rigging.placing import (
     aligned_template,
@@ -157,7 +157,15 @@ def _take_click(state: AppState) -> None:
     else:
         assert view.target is not None  # tools need a target
         mesh, matrix, what = target_mesh(state), target_place(view.target), "target"
-    hit = _hit(view_frame(state), mesh, matrix, place)
+    # The ray is moved into the space of the mesh.
+    origin, direction = view_frame(state).ray(place)
+    back = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    hit = first_hit(
+        mesh.positions,
+        mesh.triangles,
+        np.asarray(apply_transform(back, origin[None])[0]),
+        back[:3, :3] @ direction,
+    )
     if hit is None:
         state.say_status(f"Landmarks: click on the {what}")
     elif view.pending is None:
@@ -168,18 +176,6 @@ def _take_click(state: AppState) -> None:
         view.pending = None
         count = len(view.landmarks)
         state.say_status(f"{count} landmark{'s' * (count != 1)}")
-
-
-def _hit(frame: ViewFrame, mesh: Mesh, matrix: Floats, place: tuple[float, float]) -> RayHit | None:
-    """Return the point of a mesh that is visible at a position in the window."""
-    origin, direction = frame.ray(place)
-    back = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-    return first_hit(
-        mesh.positions,
-        mesh.triangles,
-        np.asarray(apply_transform(back, origin[None])[0]),
-        back[:3, :3] @ direction,
-    )
 
 
 def _draw_landmarks(state: AppState, template: Template) -> None:
@@ -297,7 +293,14 @@ def _scaled(state: AppState, before: Floats) -> Floats | None:
     if view.scaling is None and hovers and imgui.is_mouse_clicked(left):
         view.scaling = distance, float(np.cbrt(np.linalg.det(before[:3, :3])))
     view.holds_mouse = view.scaling is not None or hovers
-    _draw_ring(center, distance if view.scaling else RADIUS, view.holds_mouse)
+    # Squares on the ring indicate that it can be dragged outwards or inwards.
+    radius, ink = distance if view.scaling else RADIUS, imgui.get_background_draw_list()
+    color = imgui.get_color_u32(_HOT if view.holds_mouse else _INK)
+    ink.add_circle(center, radius, color, 64, 3.0 if view.holds_mouse else 2.0)
+    for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+        middle = center[0] + radius * x, center[1] + radius * y
+        low, high = (middle[0] - 5.0, middle[1] - 5.0), (middle[0] + 5.0, middle[1] + 5.0)
+        ink.add_rect_filled(low, high, color)
     if view.scaling is None or not imgui.is_mouse_pos_valid():
         return None
     first, size = view.scaling
@@ -305,13 +308,3 @@ def _scaled(state: AppState, before: Floats) -> Floats | None:
     now = float(np.cbrt(np.linalg.det(before[:3, :3])))
     after[:3, :3] *= size * max(distance / first, _LEAST) / now
     return after if (after != before).any() else None
-
-
-def _draw_ring(center: tuple[float, float], radius: float, is_hot: bool) -> None:
-    """Draw the ring, with squares that indicate that it can be dragged outwards or inwards."""
-    ink, color = imgui.get_background_draw_list(), imgui.get_color_u32(_HOT if is_hot else _INK)
-    ink.add_circle(center, radius, color, 64, 3.0 if is_hot else 2.0)
-    for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
-        middle = center[0] + radius * x, center[1] + radius * y
-        low, high = (middle[0] - 5.0, middle[1] - 5.0), (middle[0] + 5.0, middle[1] + 5.0)
-        ink.add_rect_filled(low, high, color)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,8 +83,9 @@ def finish_work(state: AppState) -> None:
         running.finish(state)
 
 
-def start_adding(state: AppState, path: Path) -> None:
+def start_adding(state: AppState, paths: Sequence[Path]) -> None:
     """Read a mesh to rig, and add it to the scene."""
+    path = paths[0]
 
     def act() -> _Finish:
         report(0, 0, "", f"Reading {printable(path.name, 60)}")
@@ -104,29 +105,22 @@ def start_adding(state: AppState, path: Path) -> None:
             state.paths = (*state.paths, path)
             state.of(Rigging).target = None  # makes the panel choose again
             state.say(*scene.diagnostics, *notes)
-            _show_added(state, actor)
+            choose_target(state, actor)
+            state.choose_actor(len(state.scene.actors) - 1)
+            state.framing.restart()
 
         return finish
 
     _begin(state, f"Reading {printable(path.name, 60)}", act)
 
 
-def _show_added(state: AppState, actor: Actor) -> None:
-    """Choose a mesh that was added to the scene, and fit the camera to it."""
-    choose_target(state, actor)
-    state.choose_actor(len(state.scene.actors) - 1)
-    state.framing.restart()
-
-
-def start_reading(
-    state: AppState, paths: tuple[Path, ...] = (), then: _Finish | None = None
-) -> None:
+def start_reading(state: AppState, paths: Sequence[Path] = (), then: _Finish | None = None) -> None:
     """Read the chosen template, or choose one and read it from other files."""
     key = "file" if paths else state.of(Rigging).template_key
 
     def act() -> _Finish:
         report(0, 0, "", "Reading the template")
-        template = read_template(paths or template_files(key), key)
+        template = read_template(tuple(paths) or template_files(key), key)
 
         def finish(state: AppState) -> None:
             state.of(Rigging).template = template
@@ -181,25 +175,21 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
         def finish(state: AppState) -> None:
             _keep(state, template)
+            rigging = state.of(Rigging)
             if asked is not None and how.matrix is not None:
-                _take_measured(state, asked, found)
+                # The placement by hand now has an error, unless the template has been moved since.
+                known = found if found.fitted is None else replace(found, lines=asked.lines)
+                if rigging.placing is asked:
+                    rigging.placing = known
+                state.history.exchange(asked, known)
                 return
-            state.of(Rigging).placing = found
-            if state.of(Rigging).tool == "landmarks":
-                state.of(Rigging).tool = ""  # the template is shown aligned, not next to the target
+            rigging.placing = found
+            if rigging.tool == "landmarks":
+                rigging.tool = ""  # the template is shown aligned, not next to the target
 
         return finish
 
     _begin(state, "Aligning", act)
-
-
-def _take_measured(state: AppState, asked: Placing, found: Placing) -> None:
-    """Store the error of a placement by hand, unless the template has been moved since."""
-    rigging = state.of(Rigging)
-    known = replace(found, lines=asked.lines) if found.fitted is not None else found
-    if rigging.placing is asked:
-        rigging.placing = known
-    state.history.exchange(asked, known)
 
 
 def _search_settings(choices: RigChoices) -> AlignmentSettings:
@@ -276,16 +266,16 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
             rigged = _with_known_method(rigged, found)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
-        return lambda state: _put(state, results, found)
+
+        def finish(state: AppState) -> None:
+            _keep(state, template)
+            state.of(Rigging).placing = found
+            both = compare(*results) if len(results) == len(METHODS) else None
+            put_results(state, results, both)
+
+        return finish
 
     _begin(state, f"Rigging {printable(name, 40)}", act, "rigging")
-
-
-def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:
-    """Add the results of a run to the scene."""
-    _keep(state, results[0].template)
-    state.of(Rigging).placing = placing
-    put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)
 
 
 def align_template(

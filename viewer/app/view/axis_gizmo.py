@@ -70,8 +70,9 @@ def _go_on(state: AppState, gizmo: AxisGizmo) -> None:
         orbit(state.camera, -_DEGREES_PER_POINT * delta.x, _DEGREES_PER_POINT * delta.y)
     if not imgui.is_mouse_down(_LEFT):
         gizmo.is_held = False
-        name = "" if has_moved else _view_at(state, (io.mouse_pos.x, io.mouse_pos.y))
-        if name:
+        end = None if has_moved else _end_at(state, (io.mouse_pos.x, io.mouse_pos.y))
+        if end is not None:
+            name = _named(state, end)
             fly_to(state, name)
             state.say_status(f"{name.capitalize()} view")
 
@@ -119,15 +120,13 @@ def _draw_end(end: _End, center: tuple[float, float], unit: float, is_hot: bool)
     if is_hot:
         pen.add_circle(place, radius, imgui.get_color_u32((1.0, 1.0, 1.0, 1.0)), 0, 2.0 * unit)
     if end.sign > 0 or is_hot:
-        _write(("" if end.sign > 0 else "-") + "XYZ"[end.axis], place, end.sign > 0)
-
-
-def _write(text: str, place: tuple[float, float], is_dark: bool) -> None:
-    size = 0.85 * imgui.get_font_size()
-    extent = imgui.calc_text_size(text)
-    corner = (place[0] - 0.425 * extent.x, place[1] - 0.425 * extent.y)
-    ink = imgui.get_color_u32((0.05, 0.06, 0.08, 1.0) if is_dark else (1.0, 1.0, 1.0, 1.0))
-    imgui.get_background_draw_list().add_text(imgui.get_font(), size, corner, ink, text)
+        text = ("" if end.sign > 0 else "-") + "XYZ"[end.axis]
+        size = 0.85 * imgui.get_font_size()
+        extent = imgui.calc_text_size(text)
+        corner = (place[0] - 0.425 * extent.x, place[1] - 0.425 * extent.y)
+        shade = (0.05, 0.06, 0.08, 1.0) if end.sign > 0 else (1.0, 1.0, 1.0, 1.0)
+        ink = imgui.get_color_u32(shade)
+        pen.add_text(imgui.get_font(), size, corner, ink, text)
 
 
 def _unit() -> float:
@@ -180,12 +179,6 @@ def _end_at(state: AppState, place: tuple[float, float]) -> _End | None:
     reach = (_END + 2.0) * _unit()
     near = [e for e in _ends(state) if np.hypot(e.x - place[0], e.y - place[1]) <= reach]
     return max(near, key=lambda end: end.depth, default=None)
-
-
-def _view_at(state: AppState, place: tuple[float, float]) -> str:
-    """Return the view that a click at a window position selects; empty for none."""
-    end = _end_at(state, place)
-    return "" if end is None else _named(state, end)
 
 
 def _named(state: AppState, end: _End) -> str:

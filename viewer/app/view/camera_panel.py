@@ -11,9 +11,9 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     choice,
+    draw_setting,
     explain,
     note_item,
-    setting_slider,
     slider,
     with_key,
 )
@@ -39,9 +39,8 @@ def draw(state: AppState) -> None:
     _draw_views(state)
     before = _place(state)
     size = box_size(state.box) or 1.0
-    distance = slider(
-        state, "Distance", camera.distance, 0.05 * size, 20.0 * size, _digits(size), _LOG
-    )
+    digits = "%.3g" if size < 0.1 or size > 1e4 else "%.2f"  # enough for the figure's unit
+    distance = slider(state, "Distance", camera.distance, 0.05 * size, 20.0 * size, digits, _LOG)
     camera.distance = max(distance, 1e-9)
     camera.azimuth = slider(state, "Azimuth", camera.azimuth, -180.0, 180.0, "%.1f\N{DEGREE SIGN}")
     camera.inclination = slider(
@@ -62,11 +61,6 @@ def draw(state: AppState) -> None:
             imgui.same_line()
         if button(state, name.capitalize()):
             look(state, name)
-    _draw_front(state)
-
-
-def _draw_front(state: AppState) -> None:
-    """Draw the choice of the axis that the figures face, which defines the named views."""
     up, ahead = state.scene.up, state.camera.front
     texts = {axis: axis for axis in front_axes(up)}
     now = next((axis for axis in texts if front_azimuth(axis, up) == ahead), "auto")
@@ -93,16 +87,10 @@ def _draw_views(state: AppState) -> None:
     note_item(state, "Calibrated camera")
     if changed:
         look_through(state, chosen - 1)
-    options = state.options
-    options.cameras = checkbox(state, "Show cameras", options.cameras)
-    explain("frusta of the calibrated cameras, with their images")
+    options, text = state.options, "frusta of the calibrated cameras, with their images"
+    draw_setting(state, "Show cameras", options, "cameras", text)
     if fixed is not None and state.scene.images is not None:
-        setting_slider(state, "Image brightness", options, "image_brightness")
-
-
-def _digits(size: float) -> str:
-    """Return a format with enough digits for the figure's unit."""
-    return "%.3g" if size < 0.1 or size > 1e4 else "%.2f"
+        draw_setting(state, "Image brightness", options, "image_brightness")
 
 
 def fit_view(state: AppState) -> None:

@@ -11,12 +11,11 @@ from viewer.app.core.widgets import (
     begin_menu,
     checkbox,
     choice,
-    disabled,
-    explain,
+    draw_setting,
     menu_item,
     note_item,
+    radio,
     same_line_if_room,
-    setting_slider,
     slider,
     with_key,
 )
@@ -44,9 +43,7 @@ from viewer.rendering.colors import part_colors
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import (
     BONES,
-    MATCAPS,
     OPACITIES,
-    QUALITIES,
     SHOWN,
     Lights,
     parse_color,
@@ -95,63 +92,53 @@ def draw(state: AppState) -> None:
         "binding": no_skin(state),
     }
     for key, text in SHOWN.items():
-        with disabled(state, missing[key]):
-            if imgui.radio_button(text, options.show == key):
-                show(state, key)
-            note_item(state, text)
-            explain("", missing[key])
+        if radio(state, text, options.show == key, why=missing[key]):
+            show(state, key)
         if key == "skeleton":
             _draw_bones(state, missing[key])
-    setting_slider(state, "Opacity", options, "opacity")
-    explain("opacity of all figures")
+    draw_setting(state, "Opacity", options, "opacity", "opacity of all figures")
     if options.show == "both":
         _draw_opacity(state)
     imgui.separator()
     chosen = choice(state, "Shading", options.shading, SHADING_CHOICES)
     if chosen != options.shading:
         set_shading(state, chosen)
-    _draw_surface(state)
+    if options.shading == "matcap":
+        draw_setting(state, "Matcap", options, "matcap")
+    if options.shading == "pbr":
+        for name in ("metallic", "roughness"):
+            text = "value for materials that do not specify one"
+            draw_setting(state, name.capitalize(), options, name, text)
     _draw_extras(state)
-    why = no_mesh(state)
-    options.flat = checkbox(state, "Flat", options.flat, why)
-    _beside("Wireframe")
-    options.wireframe = checkbox(state, "Wireframe", options.wireframe, why)
-    options.normals = checkbox(state, "Vertex normals", options.normals, why)
-    _beside("Texture")
-    options.texture = checkbox(state, "Texture", options.texture, no_texture(state))
-    options.cull = checkbox(state, "Cull back faces", options.cull, why)
+    for name, text, reason in (
+        ("flat", "Flat", no_mesh),
+        ("wireframe", "Wireframe", no_mesh),
+        ("normals", "Vertex normals", no_mesh),
+        ("texture", "Texture", no_texture),
+        ("cull", "Cull back faces", no_mesh),
+    ):
+        if name in ("wireframe", "texture"):
+            _beside(text)
+        draw_setting(state, text, options, name, why=reason(state))
     grid = f"Grid ({grid_step(state.box):g} {scene_unit(state.scene)}".rstrip() + ")"
     _beside(grid)
-    options.grid = checkbox(state, f"{grid}###Grid", options.grid)
+    draw_setting(state, f"{grid}###Grid", options, "grid")
     _draw_background(state)
     imgui.separator()
     _draw_joint_toggles(state)
     imgui.separator()
-    options.quality = choice(state, "Quality", options.quality, QUALITIES)
+    draw_setting(state, "Quality", options, "quality")
     if options.quality != "draft":
-        options.shadows = checkbox(state, "Shadows", options.shadows)
-
-
-def _draw_surface(state: AppState) -> None:
-    """Draw the settings of the chosen shading: a matcap, or the surface of plain materials."""
-    options = state.options
-    if options.shading == "matcap":
-        options.matcap = choice(state, "Matcap", options.matcap, MATCAPS)
-    if options.shading == "pbr":
-        for name in ("metallic", "roughness"):
-            setting_slider(state, name.capitalize(), options, name)
-            explain("value for materials that do not specify one")
+        draw_setting(state, "Shadows", options, "shadows")
 
 
 def _draw_bones(state: AppState, why: str) -> None:
     """Draw the style of skeletons next to the button that shows them."""
     imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x * 0.5)
-    with disabled(state, why):
-        imgui.set_next_item_width(-1.0)
-        state.options.bones = choice(state, "##bones", state.options.bones, BONES)
-        note_item(state, "Bones")
-        text = "style of the skeleton; automatic: the boxes of its file, otherwise octahedra"
-        explain(text, why)
+    imgui.set_next_item_width(-1.0)
+    text = "style of the skeleton; automatic: the boxes of its file, otherwise octahedra"
+    draw_setting(state, "##bones", state.options, "bones", text, why)
+    note_item(state, "Bones")
 
 
 def _draw_opacity(state: AppState) -> None:
@@ -171,27 +158,24 @@ def _draw_joint_toggles(state: AppState) -> None:
         short = text.removeprefix("Joint ").capitalize()
         if name != "xray":
             same_line_if_room(short)
-        label = f"{short}###{name}"
-        setattr(options, name, checkbox(state, label, getattr(options, name), why))
-        explain(with_key(state, text, key))
+        draw_setting(state, f"{short}###{name}", options, name, with_key(state, text, key), why)
 
 
 def _draw_extras(state: AppState) -> None:
     """Draw settings that apply only to some figures: colours, keypoints, meshes, body parts."""
     options, figure = state.options, state.actor.figure
     if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
-        options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
-        explain("vertex colours of the file, which are multiplied by the colours of materials")
+        text = "vertex colours of the file, which are multiplied by the colours of materials"
+        draw_setting(state, "Vertex colours", options, "vertex_colors", text)
     if any(one.figure.points is not None for one in state.scene.actors):
-        name = "Captured keypoints"
-        options.captured_keypoints = checkbox(state, name, options.captured_keypoints)
-        explain("keypoints of captures, drawn over the bodies")
+        text = "keypoints of captures, drawn over the bodies"
+        draw_setting(state, "Captured keypoints", options, "captured_keypoints", text)
     if figure.keypoints is not None:
-        options.keypoints = checkbox(state, "Keypoints", options.keypoints)
+        draw_setting(state, "Keypoints", options, "keypoints")
         if figure.reduced is not None:
             _beside("Reduced mesh")
     if figure.reduced is not None:
-        options.reduced = checkbox(state, "Reduced mesh", options.reduced)
+        draw_setting(state, "Reduced mesh", options, "reduced")
     if figure.body_parts is not None:
         _draw_parts(state, figure.body_parts)
 
@@ -296,7 +280,21 @@ def draw_view_menu(state: AppState) -> None:
     draw_views(state)
     _draw_cameras(state)
     imgui.separator()
-    _draw_figures(state)
+    # Draw the items of surfaces and skeletons.
+    options, no_bones = state.options, no_skeleton(state)
+    for name, (text, key) in _SURFACE_TOGGLES.items():
+        why = no_texture(state) if name == "texture" else no_mesh(state)
+        if menu_item(state, text, key, getattr(options, name), why):
+            toggle_option(state, name, text)
+    shows = options.show in ("skeleton", "both")
+    if menu_item(state, "Skeleton##shown", "S", shows, no_bones):
+        toggle_skeleton(state)
+    if begin_menu(state, "Bones", not no_bones):
+        draw_bone_styles(state)
+        imgui.end_menu()
+    for name, (text, key) in JOINT_TOGGLES.items():
+        if menu_item(state, text, key, getattr(options, name), no_bones):
+            toggle_option(state, name, text)
     imgui.separator()
     _draw_vertices(state)
     imgui.separator()
@@ -335,24 +333,6 @@ def _draw_cameras(state: AppState) -> None:
         if menu_item(state, text, "", state.camera.fixed is view):
             look_through(state, number)
     imgui.end_menu()
-
-
-def _draw_figures(state: AppState) -> None:
-    """Draw the items of surfaces and skeletons."""
-    options, no_bones = state.options, no_skeleton(state)
-    for name, (text, key) in _SURFACE_TOGGLES.items():
-        why = no_texture(state) if name == "texture" else no_mesh(state)
-        if menu_item(state, text, key, getattr(options, name), why):
-            toggle_option(state, name, text)
-    shows = options.show in ("skeleton", "both")
-    if menu_item(state, "Skeleton##shown", "S", shows, no_bones):
-        toggle_skeleton(state)
-    if begin_menu(state, "Bones", not no_bones):
-        draw_bone_styles(state)
-        imgui.end_menu()
-    for name, (text, key) in JOINT_TOGGLES.items():
-        if menu_item(state, text, key, getattr(options, name), no_bones):
-            toggle_option(state, name, text)
 
 
 def draw_bone_styles(state: AppState) -> None:

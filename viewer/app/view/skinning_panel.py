@@ -9,14 +9,14 @@ from viewer.app.core.widgets import (
     checkbox,
     count_slider,
     disabled,
+    draw_setting,
     explain,
     note_item,
     slider,
 )
 from viewer.app.files.files import offer_files
-from viewer.rig.figure import Figure
 from viewer.rig.scalars import strongest
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rig.skinning import METHODS
 
 _CLAMP = imgui.SliderFlags_.always_clamp
 _ENGINE = 4  # influences per vertex in most game engines
@@ -31,15 +31,6 @@ def draw(state: AppState) -> None:
             "This figure has no skin attached to a skeleton: open its .skel and .skin together.",
         )
         return
-    _draw_method(state, skinning)
-    _draw_stated(state, figure, skinning)
-    imgui.separator()
-    _draw_influences(state, figure, skinning)
-    if figure.correctives is not None:
-        skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
-
-
-def _draw_method(state: AppState, skinning: Skinning) -> None:
     for number, (key, method) in enumerate(METHODS.items()):
         if number:
             imgui.same_line()
@@ -58,18 +49,11 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
         factor = slider(state, title, shown, 0.0, 1.0, flags=_CLAMP)
         if factor != shown:
             skinning.method, skinning.blend_factor = key, factor
-
-
-def _draw_stated(state: AppState, figure: Figure, skinning: Skinning) -> None:
-    """Draw a checkbox for the fraction of DQS that the file states at each vertex."""
-    if figure.require_skin().dqs_fractions is None:
-        return
-    is_stated = skinning.method == "mix" and skinning.blend_factor is None
-    if checkbox(state, "Fractions of the file", is_stated) != is_stated:
-        skinning.method, skinning.blend_factor = "mix", 0.5 if is_stated else None
-
-
-def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> None:
+    if figure.require_skin().dqs_fractions is not None:
+        is_stated = skinning.method == "mix" and skinning.blend_factor is None
+        if checkbox(state, "Fractions of the file", is_stated) != is_stated:
+            skinning.method, skinning.blend_factor = "mix", 0.5 if is_stated else None
+    imgui.separator()
     most = strongest(figure)
     is_limited = skinning.max_influences > 0
     count = skinning.max_influences or _ENGINE
@@ -87,4 +71,6 @@ def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> Non
         skinning.max_influences = chosen
     why = "the weights of limited influences are always normalised"
     why = why if skinning.max_influences else ""
-    skinning.normalize = checkbox(state, "Normalise weights", skinning.normalize, why)
+    draw_setting(state, "Normalise weights", skinning, "normalize", why=why)
+    if figure.correctives is not None:
+        draw_setting(state, "Pose correctives", skinning, "correctives")

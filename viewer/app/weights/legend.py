@@ -5,9 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect
+from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect, swatch
 from viewer.phrases import printable
-from viewer.rendering.overlay.legend import Legend, LegendEntry, legend_columns
+from viewer.rendering.overlay.legend import Legend, legend_columns
 
 _GAP = 10.0  # points from the edges of the view
 _BAR = (40.0 / 3.0, 0.8)  # width and height of the bar, in font sizes
@@ -87,20 +87,12 @@ def _draw_entries(legend: Legend, width: float, height: float) -> None:
         imgui.set_cursor_pos((left, top))
         for row in range(first, first + count):
             imgui.set_cursor_pos_x(left)
-            _draw_entry(legend.entries[row], texts[row], side)
+            r, g, b = (channel / 255.0 for channel in legend.entries[row].color)
+            swatch((r, g, b))
+            imgui.text_unformatted(texts[row])
         if number == len(columns.counts) - 1 and columns.left_out:
             imgui.set_cursor_pos_x(left)
             imgui.text_disabled(f"and {columns.left_out} more")
         first, left = first + count, left + columns.widths[number]
     imgui.set_cursor_pos((imgui.get_style().window_padding.x, top + columns.rows * line))
     imgui.dummy((0.0, 0.0))  # ImGui requires an item after the cursor is set
-
-
-def _draw_entry(entry: LegendEntry, text: str, side: float) -> None:
-    place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
-    r, g, b = (channel / 255.0 for channel in entry.color)
-    color = imgui.get_color_u32((r, g, b, 1.0))
-    draw_list.add_rect_filled(place, (place.x + side, place.y + side), color)
-    imgui.dummy((side, side))
-    imgui.same_line()
-    imgui.text_unformatted(text)

@@ -20,6 +20,7 @@ from viewer.app.core.widgets import (
     note_item,
     overlay_rect,
     same_line_if_room,
+    swatch,
     with_key,
 )
 from viewer.app.files.files import Files
@@ -119,16 +120,34 @@ def _fitting(room: float, font_size: float) -> tuple[float, int]:
 
 def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
     """Draw the steps of the skinning of the vertex in order."""
-    _draw_rest(sheet, one)
+    # From the vertex in the file to p, the position before skinning.
+    rows = [("stored", one.stored)]
+    if not np.array_equal(one.shaped, one.stored):
+        rows.append(("+ shape", one.shaped))
+    if not np.array_equal(one.rest, one.shaped):
+        rows.append(("+ correctives", one.rest))
+    _draw_rows(sheet, "rest", [*rows, ("p", one.rest)])
     if one.is_free:
         imgui.text_wrapped("No influence: the vertex stays at its bind position.")
     else:
         for index in range(len(one.joints)):
             _draw_influence(sheet, one, index, colors[index])
-        _draw_sums(sheet, one)
+        imgui.separator()
+        sums = [("sum w", one.weights.sum(keepdims=True)), ("sum w M p", one.linear)]
+        _draw_rows(sheet, "sums", sums)
         if one.dual is not None:
             _draw_dual(sheet, one.dual)
-    _draw_end(sheet, one)
+    imgui.separator()
+    method = METHODS[one.skinning.method]
+    if method.result:
+        ends = " to ".join(METHODS[end].short for end in method.ends)
+        text = method.result.format(blend_factor=f"{one.skinning.blend_factor:.2f}")
+        imgui.text_wrapped(f"{text} from {ends}" if ends else text)
+        _draw_rows(sheet, "result", [("skinned", one.skinned)])
+    if not np.array_equal(one.placement, np.eye(4)):
+        factor = one.placement[0, :1]
+        _draw_rows(sheet, "placed", [("scale", factor), ("translation", one.placement[:3, 3])])
+    _draw_rows(sheet, "end", [("position", one.position)])
 
 
 def _draw_head(state: AppState, one: Explanation) -> None:
@@ -152,21 +171,11 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     )
 
 
-def _draw_rest(sheet: _Sheet, one: Explanation) -> None:
-    """Draw the steps from the vertex in the file to p, the position before skinning."""
-    rows = [("stored", one.stored)]
-    if not np.array_equal(one.shaped, one.stored):
-        rows.append(("+ shape", one.shaped))
-    if not np.array_equal(one.rest, one.shaped):
-        rows.append(("+ correctives", one.rest))
-    _draw_rows(sheet, "rest", [*rows, ("p", one.rest)])
-
-
 def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) -> None:
     """Draw one influence: its matrix, its image of the vertex, and its term of the sum."""
     state, number = sheet.state, index + 1
     imgui.separator()
-    _draw_swatch(color)
+    swatch(color.tolist())
     pinned = state.of(Weights).pinned
     is_chosen = pinned is not None and state.chosen_actor == pinned.actor
     joint, name = int(one.joints[index]), printable(one.names[index], _LONGEST)
@@ -192,27 +201,9 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
         state.say_status(f"M{number} copied")
 
 
-def _draw_swatch(color: Floats) -> None:
-    """Draw the colour of an influence in the view, at the beginning of a line."""
-    place, side = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
-    r, g, b = color.tolist()
-    ink = imgui.get_color_u32((r, g, b, 1.0))
-    corner = (place.x + side, place.y + side)
-    imgui.get_window_draw_list().add_rect_filled(place, corner, ink)
-    imgui.dummy((side, side))
-    imgui.same_line()
-
-
 def matrix_text(matrix: Floats) -> str:
     """Return a matrix (4, 4) as rows of numbers in full precision."""
     return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
-
-
-def _draw_sums(sheet: _Sheet, one: Explanation) -> None:
-    imgui.separator()
-    _draw_rows(
-        sheet, "sums", [("sum w", one.weights.sum(keepdims=True)), ("sum w M p", one.linear)]
-    )
 
 
 def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
@@ -236,21 +227,6 @@ def _draw_quaternions(sheet: _Sheet, name: str, values: Floats) -> None:
     explain("the real part x y z w, then the dual part")
 
 
-def _draw_end(sheet: _Sheet, one: Explanation) -> None:
-    """Draw the result of skinning, the figure's placement, and the final position."""
-    imgui.separator()
-    method = METHODS[one.skinning.method]
-    if method.result:
-        ends = " to ".join(METHODS[end].short for end in method.ends)
-        text = method.result.format(blend_factor=f"{one.skinning.blend_factor:.2f}")
-        imgui.text_wrapped(f"{text} from {ends}" if ends else text)
-        _draw_rows(sheet, "result", [("skinned", one.skinned)])
-    if not np.array_equal(one.placement, np.eye(4)):
-        factor = one.placement[0, :1]
-        _draw_rows(sheet, "placed", [("scale", factor), ("translation", one.placement[:3, 3])])
-    _draw_rows(sheet, "end", [("position", one.position)])
-
-
 def _draw_rows(sheet: _Sheet, name: str, rows: Sequence[tuple[str, Floats]]) -> None:
     """Draw rows of a label and some numbers; four numbers leave no room for labels."""
     count = max(len(values) for _, values in rows)
@@ -269,18 +245,14 @@ def _draw_rows(sheet: _Sheet, name: str, rows: Sequence[tuple[str, Floats]]) -> 
                 imgui.table_next_column()
                 imgui.text_unformatted(text)
             for value in values.tolist():
-                _draw_number(value, sheet.digits)
+                imgui.table_next_column()
+                text = number_text(value, f".{sheet.digits}f")
+                # Numbers end at the right edge of their cells.
+                rest = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+                imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(rest, 0.0))
+                imgui.text_unformatted(text)
         imgui.end_table()
     imgui.end_group()
-
-
-def _draw_number(value: float, digits: int) -> None:
-    """Draw a number at the right edge of the next cell."""
-    imgui.table_next_column()
-    text = number_text(value, f".{digits}f")
-    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
-    imgui.text_unformatted(text)
 
 
 def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:

@@ -17,16 +17,17 @@ from viewer.app.core.widgets import (
     checkbox,
     choice,
     disabled,
+    draw_setting,
     explain,
     note_item,
     plain_zero,
+    radio,
     same_line_if_room,
 )
 from viewer.app.layout import is_open, set_open, show_panel
 from viewer.app.posing.joint_tree import select_joint
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
-from viewer.rendering.options import COLORMAPS
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.arrays import Floats
@@ -134,7 +135,10 @@ def draw(state: AppState) -> None:
         _draw_joint(state)
     if SCALARS[key].about == "field":
         _draw_fields(state, key)
-    _draw_largest(state, key)
+    if state.options.shading == "scalar" and SCALARS[key].unit == "length":
+        factor, unit = length_unit(state.actor.figure)
+        most = short_number(factor * state.stats.scalar_range[1])
+        imgui.text_wrapped(f"up to {most} {unit} in this pose")
     with disabled(state, "" if options.shading == "scalar" else "the heat map is off"):
         _draw_range(state, key)
         _draw_marks(state, key)
@@ -192,35 +196,23 @@ def _draw_fields(state: AppState, key: str) -> None:
         show_scalar(state, f"{key}:{chosen}")
 
 
-def _draw_largest(state: AppState, key: str) -> None:
-    """Draw the largest value of a length, in the figure's unit."""
-    if state.options.shading == "scalar" and SCALARS[key].unit == "length":
-        factor, unit = length_unit(state.actor.figure)
-        most = short_number(factor * state.stats.scalar_range[1])
-        imgui.text_wrapped(f"up to {most} {unit} in this pose")
-
-
 def _draw_range(state: AppState, key: str) -> None:
     """Draw the choice of the colour range: automatic, or fixed by two numbers."""
     options = state.options
     why = "this quantity has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
-    with disabled(state, why):
-        if imgui.radio_button("Automatic", options.scalar_range is None):
-            options.scalar_range = None
-        note_item(state, "Automatic")
-        explain(
-            f"the colours span {TYPICAL:.0%} of the nonzero values; values outside have the end "
-            f"colours"
-            if SCALARS[key].robust
-            else "the colours span all values",
-            why,
-        )
-        same_line_if_room("Fixed")
-        if imgui.radio_button("Fixed", options.scalar_range is not None):
-            options.scalar_range = options.scalar_range or _present_range(state)
-        note_item(state, "Fixed")
-        explain("the range does not change with the pose; values outside it have the end "
-                "colours", why)  # fmt: skip
+    text = "the colours span all values"
+    if SCALARS[key].robust:
+        text = f"the colours span {TYPICAL:.0%} of the nonzero values; values outside have the end "
+        text += "colours"
+    if radio(state, "Automatic", options.scalar_range is None, text=text, why=why):
+        options.scalar_range = None
+    same_line_if_room("Fixed")
+    text = "the range does not change with the pose; values outside it have the end colours"
+    if radio(state, "Fixed", options.scalar_range is not None, text=text, why=why):
+        # The current automatic range, in the unit of the legend.
+        factor = shown_unit(options.scalar, state.actor.figure)[0]
+        low, high = (float(f"{factor * end:.3g}") for end in state.stats.scalar_ends)
+        options.scalar_range = options.scalar_range or (low, high)
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range
         unit = shown_unit(options.scalar, state.actor.figure)[1]
@@ -228,8 +220,7 @@ def _draw_range(state: AppState, key: str) -> None:
             _end_field(state, "From", low, unit, -math.inf, high),
             _end_field(state, "To", high, unit, low, math.inf),
         )
-    with disabled(state, why):
-        options.colormap = choice(state, "Colours", options.colormap, COLORMAPS)
+    draw_setting(state, "Colours", options, "colormap", why=why)
 
 
 def _end_field(
@@ -245,13 +236,6 @@ def _end_field(
     return typed if typed is not None and above < typed < below else value
 
 
-def _present_range(state: AppState) -> tuple[float, float]:
-    """Return the current automatic range, in the unit of the legend."""
-    factor, _ = shown_unit(state.options.scalar, state.actor.figure)
-    low, high = state.stats.scalar_ends
-    return float(f"{factor * low:.3g}"), float(f"{factor * high:.3g}")
-
-
 def _draw_marks(state: AppState, key: str) -> None:
     """Draw the check boxes for isolines and the legend."""
     options, view = state.options, SCALARS[key]
@@ -260,10 +244,9 @@ def _draw_marks(state: AppState, key: str) -> None:
     wanted = checkbox(state, "Isolines", shown and not why, why)
     if wanted != shown and not why:
         options.isolines = None if wanted == view.isolines else wanted
-    text = "Legend in pictures"
-    same_line_if_room(text)
-    options.legend = checkbox(state, text, options.legend)
-    explain("draw the legend into screenshots and recordings")
+    same_line_if_room("Legend in pictures")
+    text = "draw the legend into screenshots and recordings"
+    draw_setting(state, "Legend in pictures", options, "legend", text)
 
 
 def _draw_vertex_tools(state: AppState) -> None:
