@@ -244,6 +244,7 @@ class Clock:
         if length <= 0.0:
             self.time = self.start
             return
+        # The way back is the second half of a period of two lengths.
         place = min(max(self.time - self.start, 0.0), length)
         place = ((2.0 * length - place if self._is_returning else place) + step) % (2.0 * length)
         self._is_returning = place > length

@@ -44,6 +44,7 @@ class ViewFrame:
 
     def at_depth_of(self, point: Floats, place: Place) -> Floats:
         """Return the scene point (3,) at a window position, at the depth of another point (3,)."""
+        # Points of a plane parallel to the image have the same depth and w in clip space.
         clip = self.matrix @ np.append(point, 1.0)
         found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))
         return np.asarray(found[:3] / found[3])

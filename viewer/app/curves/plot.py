@@ -212,7 +212,7 @@ def keyed_lines(keyed: KeyedMotion, row: int, low: float, high: float) -> _Lines
         line = times, keyed.values((row,), times)[:, 0]
         if keyed.wraps(row):
             line = _broken(*line)
-    step = (high - low) / _DASHES
+    step = (high - low) / _DASHES  # from one dash to the next, seconds
     sides = (low, min(high, first)), (max(low, last), high)
     before, after = (
         _dashes(keyed, row, side, step) if side[0] < side[1] else None for side in sides
@@ -395,6 +395,8 @@ def _draw_handle(
     """Draw one tangent as a line of fixed length with a knob; dragging makes it explicit."""
     factor, sign = plot.factor(place[0]), (-1.0, 1.0)[side]
     (time, value), slope = (point[0], factor * point[1]), factor * slope
+    # The line has the same length in pixels at any slope: a step of dt is dt * across pixels wide
+    # and slope * dt * up high, so it is hypot(1, slope * up / across) times as long as it is wide.
     across, up = plot.scale
     length = _HANDLE_LENGTH * imgui.get_font_size() / math.hypot(1.0, slope * up / across)
     end, height = time + sign * length / across, value + sign * slope * length / across

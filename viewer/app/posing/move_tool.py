@@ -179,6 +179,10 @@ def _dragged(center: Floats, first: Place, frame: ViewFrame, place: Place) -> Fl
 
 def _nearest_to(center: Floats, axis: Floats, origin: Floats, direction: Floats) -> float:
     """Return the position along an axis that is nearest to another line."""
+    # The points c + s a and o + t d of two lines with unit directions are nearest to each other if
+    # their difference is perpendicular to a and to d. With k = a . d, eliminating t gives
+    # s (1 - k^2) = (o - c) . a - k (o - c) . d. For almost parallel lines, which differ by less
+    # than 0.06 degrees, s would be arbitrarily large.
     across = float(axis @ direction)
     room = max(1.0 - across * across, 1e-6)
     away = origin - center

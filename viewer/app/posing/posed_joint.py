@@ -54,6 +54,7 @@ class PosedJoint:
 
     def parent_axis(self, axis: Floats) -> Floats:
         """Return a rotation axis of the scene in the parent's frame: (3,), unit."""
+        # The inverse of cof(A) is A^T / det A; only its sign matters to a unit vector.
         linear = self.parent_linear
         return unit(linear.T @ axis) * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
 

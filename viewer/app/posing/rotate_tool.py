@@ -172,6 +172,7 @@ class RotateHandle:
         along = float(axis @ direction)
         if abs(along) < 1e-6:
             return None
+        # The line of sight o + t d meets the plane through c where axis . (o + t d - c) = 0.
         away = origin + direction * float(axis @ (self.center - origin)) / along - self.center
         if not np.isfinite(frame.project(self.center + away)).all():
             return None  # the line of sight meets the plane behind the eye
@@ -181,7 +182,9 @@ class RotateHandle:
         """Return the angle of a ring seen edge-on, which is rolled like a wheel."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
-        # Movement of the ring's front for 1 mrad.
+        # A point r of the ring moves by axis x r for each radian, its front by axis x eye times the
+        # radius. This is projected for 1 mrad, an arc that is straight in the image, and scaled to
+        # window coordinates per radian. The pointer's movement along it is the angle.
         rim = 1e-3 * radius * np.cross(self.ring.axis, eye)
         ends = frame.project(np.stack([self.center, self.center + rim]))
         way = (ends[1] - ends[0]) * 1e3

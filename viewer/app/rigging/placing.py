@@ -90,6 +90,8 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     if like is not None and not like.is_plain:
         own = np.linalg.norm(linear, axis=0)
         own = own / np.cbrt(np.prod(own))
+    # The determinant of a scaled rotation s R is s^3. A float32 gizmo may leave a shear, which the
+    # nearest rotation drops; a vanishing scale stays above 0.
     linear = linear / own
     scale = float(np.cbrt(max(np.linalg.det(linear), 1e-30)))
     rotation = np.asarray(nearest_rotations(linear / scale)[0], dtype=np.float64)

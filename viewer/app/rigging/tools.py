@@ -262,7 +262,8 @@ def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
     if not camera.is_parallel:
         return view, camera.projection_matrix(state.aspect, state.box)
     # A perspective from far away projects points at the depth of the gizmo's centre to the same
-    # positions, and points near it to almost the same positions.
+    # positions, and points near it to almost the same positions: at a distance of _FAR half
+    # heights, a focal length of _FAR maps the half height to 1.
     half = camera.half_height
     away, depth = _FAR * half, float(view[2, :3] @ middle + view[2, 3])
     near, far = 0.5 * away, 1.5 * away

@@ -73,6 +73,7 @@ def advance_flight(state: AppState, seconds: float) -> None:
         if state.framing.is_fitting:
             fit_again(state)  # the view or the scene may have changed during the animation
     else:
+        # 3 s^2 - 2 s^3 starts and ends at rest.
         _put(state, flight, _between(start, end, share * share * (3.0 - 2.0 * share)))
 
 
@@ -94,6 +95,7 @@ def _between(start: _Place, end: _Place, share: float) -> _Place:
     """Return an interpolated position; azimuths are interpolated along the shorter arc."""
     angle = (end.azimuth - start.azimuth + 180.0) % 360.0 - 180.0
     azimuth = (start.azimuth + share * angle + 180.0) % 360.0 - 180.0
+    # Equal steps multiply the distance by equal factors, so that the scene grows evenly.
     ratio = np.log(end.distance / start.distance)
     return _Place(
         start.target + share * (end.target - start.target),
