@@ -135,7 +135,7 @@ PROGRAM = """
 import os, signal, sys
 from pathlib import Path
 from viewer.app import window
-from viewer.app.recording.record_dialog import RecordingState, RecordSettings
+from viewer.app.recording.recording import RecordingState, RecordSettings
 from viewer.cli import run
 
 server, folder = int(sys.argv[1]), sys.argv[2]

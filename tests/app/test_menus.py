@@ -21,7 +21,7 @@ from viewer.app.files.files import Files
 from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.layout import PANELS, ShownPanels
 from viewer.app.posing.gizmo import joint_places
-from viewer.app.recording.record_dialog import KINDS, RecordSettings, ask_where
+from viewer.app.recording.recording import KINDS, RecordSettings, ask_where
 from viewer.app.weights.weights_panel import Weights
 from viewer.app.window import awaits_tooltip
 from viewer.models import load_model_folder, save_model_folder

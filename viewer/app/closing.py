@@ -9,9 +9,8 @@ from functools import partial
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.edited_animations import Animations, edited_aside
 from viewer.app.core.jobs import Job
-from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.saved_work import Animations, SavedWork, edited_aside
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_dialog, button, explain, same_line_if_room
 from viewer.app.curves.editing import ask_for_clip

@@ -49,7 +49,7 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.posing.toolbar import choose_tool, key_pose_now, next_orientation, no_keys
 from viewer.app.preferences.preferences_window import open_preferences
-from viewer.app.recording.record_dialog import open_record_dialog
+from viewer.app.recording.recording import open_record_dialog
 from viewer.app.retargeting.drive_changes import no_edit, toggle_feet
 from viewer.app.retargeting.joint_match_panel import (
     ask_for_map,

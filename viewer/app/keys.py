@@ -18,7 +18,7 @@ from viewer.app.posing.toolbar import cancel_drag
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.preferences import CAPTURED, Appearance, Preferences
 from viewer.app.preferences.preferences_window import close_preferences
-from viewer.app.recording.record_dialog import RecordingState
+from viewer.app.recording.recording import RecordingState
 from viewer.app.rigging.tools import drop_rig_tool
 from viewer.app.weights.weights_panel import Weights, unpin
 from viewer.data_classes import dataclass

@@ -46,7 +46,7 @@ from viewer.app.posing.posing import (
     save_export,
 )
 from viewer.app.preferences.preferences_window import open_preferences
-from viewer.app.recording.record_dialog import open_record_dialog
+from viewer.app.recording.recording import open_record_dialog
 from viewer.app.view.display_panel import draw_view_menu
 from viewer.export import files_written
 from viewer.formats import file_stem, opened_text

@@ -53,7 +53,9 @@ def handle_mouse(state: AppState) -> None:
         picking.wanted = (*place, True)
     elif (
         imgui.is_mouse_released(_LEFT)
-        and _is_click()
+        and _is_still(_LEFT)
+        and io.mouse_clicked_last_count[_LEFT] < 2
+        and not io.key_shift
         and (wants_vertex(state.of(Weights)) or not choose_joint(state))
     ):
         picking.wanted = (*place, False)
@@ -71,12 +73,6 @@ def _drags(button: imgui.MouseButton_) -> bool:
         return False  # the motion preceded the press
     # A motion and a release within one frame also belong to the drag.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
-
-
-def _is_click() -> bool:
-    """Return whether a button was released without a drag or a double click."""
-    io = imgui.get_io()
-    return _is_still(_LEFT) and io.mouse_clicked_last_count[_LEFT] < 2 and not io.key_shift
 
 
 def _is_still(button: imgui.MouseButton_) -> bool:

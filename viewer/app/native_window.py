@@ -69,16 +69,13 @@ class Shell:
         self._title = title
         self._saves_layout = True
         self._typed_keys = TypedKeys()
-        self._set_callbacks()
-        self.imgui = imgui.create_context()
-        self.implot = implot.create_context()
-        self._set_up_imgui(scale)
-
-    def _set_callbacks(self) -> None:
-        """Set callbacks that only record events for the loop, so that none of them can raise."""
+        # These callbacks only record events for the loop, so none of them can raise.
         glfw.set_drop_callback(self.handle, self._on_drop)
         glfw.set_framebuffer_size_callback(self.handle, self._on_change)
         glfw.set_window_refresh_callback(self.handle, self._on_change)
+        self.imgui = imgui.create_context()
+        self.implot = implot.create_context()
+        self._set_up_imgui(scale)
 
     def _on_drop(self, _: object, names: Sequence[str]) -> None:
         self.dropped += map(Path, names)

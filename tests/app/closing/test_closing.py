@@ -30,7 +30,7 @@ from viewer.app.posing.posing import (
     save_export,
     save_pose,
 )
-from viewer.app.recording.record_dialog import RecordingState, RecordSettings
+from viewer.app.recording.recording import RecordingState, RecordSettings
 from viewer.app.retargeting.joint_match_panel import (
     ask_where_to_save,
     match_automatically,

@@ -7,13 +7,13 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from viewer.app.files.files import Files
-from viewer.app.recording.record_dialog import (
+from viewer.app.recording.recording import (
+    RecordedMarks,
     RecordingState,
     RecordSettings,
     playback_frames,
     recorded_times,
 )
-from viewer.app.recording.recording_steps import RecordedMarks
 from viewer.app.weights.weights_panel import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied

@@ -59,8 +59,21 @@ def draw(state: AppState) -> None:
 
     in_row(begin_field("Position"), range(3), draw_axis)
     note_item(state, "Position")
-    _draw_springs(state, actor)
-    _draw_feet(state, actor)
+    if has_springs(actor):
+        is_on = actor.springs is not None
+        if checkbox(state, "Springs", is_on) != is_on:
+            toggle_springs(state)
+        explain(
+            "simulate hair and clothes while a motion plays; exported motions do not include this"
+        )
+    if actor.drive is not None and actor.clip is not None:
+        why, is_on = no_edit(state), plants_feet(state)
+        if checkbox(state, "Feet on the ground", is_on, why) != is_on:
+            toggle_feet(state)
+        explain(
+            "keep feet in place, with their soles on the ground, while the feet of the source "
+            "motion do not move"
+        )
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted("Camera follows")
     for text, joint in (("Actor", -1), ("Joint", state.selected_joint)):
@@ -106,29 +119,6 @@ def _draw_list(state: AppState) -> None:
             note_item(state, f"actor {index}")
             imgui.pop_id()
     imgui.end_child()
-
-
-def _draw_springs(state: AppState, actor: Actor) -> None:
-    """Draw the switch for spring joints, if the chosen actor has any."""
-    if not has_springs(actor):
-        return
-    is_on = actor.springs is not None
-    if checkbox(state, "Springs", is_on) != is_on:
-        toggle_springs(state)
-    explain("simulate hair and clothes while a motion plays; exported motions do not include this")
-
-
-def _draw_feet(state: AppState, actor: Actor) -> None:
-    """Draw the switch for feet, if the motion of another skeleton drives the chosen actor."""
-    if actor.drive is None or actor.clip is None:
-        return
-    why, is_on = no_edit(state), plants_feet(state)
-    if checkbox(state, "Feet on the ground", is_on, why) != is_on:
-        toggle_feet(state)
-    explain(
-        "keep feet in place, with their soles on the ground, while the feet of the source "
-        "motion do not move"
-    )
 
 
 def _draw_motion_paths(state: AppState, actor: Actor) -> None:

@@ -11,11 +11,10 @@ from typing import TypeVar
 import numpy as np
 
 from viewer.app.core.clock import Clock
-from viewer.app.core.edited_animations import Animations
 from viewer.app.core.framing import Framing
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
-from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.saved_work import Animations, SavedWork
 from viewer.app.core.scene_version import SceneVersion, version_of
 from viewer.app.core.undo_history import History
 from viewer.data_classes import dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING
 
@@ -250,7 +250,10 @@ def choice(
     """Draw a drop-down list and return the chosen key; ``width`` is that of ``begin_field``."""
     keys = list(texts)
     index = keys.index(value) if value in keys else 0
-    hidden = begin_field(label, width, needs=_combo_width(texts.values()))
+    # A list clips none of its labels.
+    widest = max((imgui.calc_text_size(text).x for text in texts.values()), default=0.0)
+    needs = widest + imgui.get_frame_height() + 2.0 * imgui.get_style().frame_padding.x
+    hidden = begin_field(label, width, needs=needs)
     changed, chosen = imgui.combo(hidden, index, list(texts.values()), len(keys))
     note_item(state, label)
     return keys[chosen] if changed else value
@@ -285,12 +288,6 @@ def draw_setting(
             new = slider(state, label, value, low, high, facts.get("unit", "%.2f"), flags)
         explain(text, why)
     setattr(settings, name, new)
-
-
-def _combo_width(texts: Iterable[str]) -> float:
-    """Return the width at which a drop-down list clips none of its labels."""
-    widest = max((imgui.calc_text_size(text).x for text in texts), default=0.0)
-    return widest + imgui.get_frame_height() + 2.0 * imgui.get_style().frame_padding.x
 
 
 def swatch(color: Sequence[float]) -> None:

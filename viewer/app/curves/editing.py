@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -79,45 +79,6 @@ class Curves:
         self.rows, self.keys, self.wants_fit = rows, frozenset(), True
 
 
-class KeyedMotion(Protocol):
-    """A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
-
-    def keys(self, row: int) -> tuple[Floats, Floats] | None:
-        """Return the times and values of a curve's keys, (N,) each; None without keys."""
-
-    def slopes(self, row: int) -> Floats | None:
-        """Return the slopes at the keys that can be dragged, (N, 2); None if there are none."""
-
-    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return the values of some curves at many times: (T, C); those without keys are 0."""
-
-    def wraps(self, row: int) -> bool:
-        """Return whether a curve shows angles that jump by full rotations."""
-
-    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
-        """Move keys together; they stop at unselected keys."""
-
-    def placed(
-        self, place: KeyPlace, time: float | None, value: float | None, gap: float
-    ) -> Motion:
-        """Set the time or value of one key."""
-
-    def added(self, rows: Iterable[int], time: float, actor: Actor) -> Motion:
-        """Add keys on curves; those without keys get the value of the actor's pose."""
-
-    def deleted(self, places: Iterable[KeyPlace]) -> Motion:
-        """Delete keys."""
-
-    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Motion:
-        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
-
-    def ranged(self, start: float, end: float) -> Motion:
-        """Set the playback range, seconds."""
-
-    def posed(self, actor: Actor, time: float, only_changed: bool) -> Motion:
-        """Key an actor's pose at a time."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class DofKeys:
     """A clip of DOFs, whose rows are those of the DOF table."""
@@ -126,17 +87,17 @@ class DofKeys:
     skeleton: Skeleton
 
     def keys(self, row: int) -> tuple[Floats, Floats] | None:
-        """Return the times and values of a curve's keys."""
+        """Return the times and values of a curve's keys, (N,) each; None without keys."""
         channel = channel_of(self.clip, row)
         return None if channel is None else (channel.times, channel.values)
 
     def slopes(self, row: int) -> Floats | None:
-        """Return the slopes at the keys of a curve with at least two keys."""
+        """Return the slopes at two or more keys of a curve, which can be dragged: (N, 2)."""
         channel = channel_of(self.clip, row)
         return None if channel is None or len(channel.times) < 2 else slopes(channel)
 
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return the values of some curves at many times."""
+        """Return the values of some curves at many times: (T, C); those without keys are 0."""
         return keyed_values(self.clip, rows, times)
 
     def wraps(self, row: int) -> bool:
@@ -144,7 +105,7 @@ class DofKeys:
         return False
 
     def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Clip:
-        """Move keys together."""
+        """Move keys together; they stop at unselected keys."""
         keys: dict[int, list[int]] = {}
         for row, key in places:
             keys.setdefault(row, []).append(key)
@@ -170,7 +131,7 @@ class DofKeys:
         return clip
 
     def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Clip:
-        """Set the slope on one side of keys."""
+        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
         return self.with_tangent(places, side, slope)
 
     def with_tangent(self, places: Iterable[KeyPlace], side: int, to: Tangent) -> Clip:
@@ -226,7 +187,7 @@ class TransformKeys:
         return channel.tangents[:, :, self.row(row).component]
 
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return the values of some curves at many times."""
+        """Return the values of some curves at many times: (T, C)."""
         return row_values(self.clip, self.skeleton, rows, times)
 
     def wraps(self, row: int) -> bool:
@@ -234,7 +195,7 @@ class TransformKeys:
         return self.row(row).path == "rotation"
 
     def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> TransformClip:
-        """Move keys together, including all components that share them."""
+        """Move keys, and all components that share them, up to unselected keys."""
         return move_transform_keys(self.clip, self.skeleton, places, dt, dv, gap)
 
     def placed(
@@ -277,6 +238,10 @@ class TransformKeys:
         """Key an actor's pose at a time."""
         pose = actor.require_pose()
         return key_transform_pose(self.clip, actor.figure, pose, time, only_changed)
+
+
+KeyedMotion: TypeAlias = DofKeys | TransformKeys
+"""A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
 
 
 def drop_missing(view: Curves, keyed: KeyedMotion, n_rows: int) -> None:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.core.edited_animations import Animations, keep_edited
 from viewer.app.core.jobs import ThreadJob
-from viewer.app.core.saved_work import SavedPose, SavedWork
+from viewer.app.core.saved_work import Animations, SavedPose, SavedWork, keep_edited
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button
 from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of

@@ -27,7 +27,8 @@ def draw_model_menu(state: AppState) -> None:
         if name == "anny":
             _draw_rigs(state, name, path)
             continue
-        if imgui.menu_item(name, _licence(name), False)[0]:
+        model = CATALOG.get(name.partition(":")[0])
+        if imgui.menu_item(name, model.licence if model else "", False)[0]:
             open_files(state, [path])
         note_item(state, name)
         explain(printable(path, 200))
@@ -35,9 +36,9 @@ def draw_model_menu(state: AppState) -> None:
         imgui.text_disabled("none found: choose the folder that contains them")
     imgui.separator_text("Not found")
     kinds = {name.partition(":")[0] for name in files.models}
-    for kind, model in CATALOG.items():
+    for kind, missing in CATALOG.items():
         if kind not in kinds and kind != "body":
-            _draw_missing(state, kind, model)
+            _draw_missing(state, kind, missing)
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
         ask_for_model_folder(state)
@@ -58,11 +59,6 @@ def _draw_rigs(state: AppState, name: str, path: Path) -> None:
             note_item(state, f"rig {rig}")
             explain(about)
         imgui.end_menu()
-
-
-def _licence(name: str) -> str:
-    model = CATALOG.get(name.partition(":")[0])
-    return model.licence if model else ""
 
 
 def _draw_missing(state: AppState, kind: str, model: Publication) -> None:

@@ -8,10 +8,15 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.core.edited_animations import Animations, edited_aside, with_edited_keys
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
-from viewer.app.core.saved_work import SavedPose, SavedWork
+from viewer.app.core.saved_work import (
+    Animations,
+    SavedPose,
+    SavedWork,
+    edited_aside,
+    with_edited_keys,
+)
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_item
 from viewer.app.files.file_choice import FileDialog

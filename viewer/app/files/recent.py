@@ -31,11 +31,11 @@ def state_folder() -> Path:
 def load_recent(say: _Say = to_stderr) -> list[tuple[str, ...]]:
     """Return groups of files that were opened together, latest first; empty if unreadable."""
     none: list[tuple[str, ...]] = []
-    return load_kept(state_folder() / "recent.json", _groups, none, say)[:_MOST]
 
+    def groups(data: bytes) -> list[tuple[str, ...]]:
+        return [tuple(_texts(group)) for group in _list(as_json(data))]
 
-def _groups(data: bytes) -> list[tuple[str, ...]]:
-    return [tuple(_texts(group)) for group in _list(as_json(data))]
+    return load_kept(state_folder() / "recent.json", groups, none, say)[:_MOST]
 
 
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
@@ -54,11 +54,8 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
 
 def load_closed_panels(say: _Say = to_stderr) -> set[str]:
     """Return the panels that were closed in the last run; empty if unreadable."""
-    return load_kept(state_folder() / "closed.json", _names, set(), say)
-
-
-def _names(data: bytes) -> set[str]:
-    return {*_texts(as_json(data))}
+    file = state_folder() / "closed.json"
+    return load_kept(file, lambda data: {*_texts(as_json(data))}, set(), say)
 
 
 def save_closed_panels(names: set[str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewer.app.core.edited_animations import Animations
+from viewer.app.core.saved_work import Animations
 from viewer.app.core.state import AppState
 from viewer.errors import FormatError
 from viewer.phrases import printable
@@ -78,7 +78,10 @@ def _clips(
     """Return the index and keys that each actor of the file plays; raises FormatError."""
     edited = state.of(Animations).edited
     found: dict[Actor, tuple[int, TransformClip | None]] = {}
-    for actor in _of_one_file(state, chosen):
+    for actor in state.scene.actors:
+        is_of_file = actor.figure.animations and actor.file == chosen.file is not None
+        if actor is not chosen and not is_of_file:
+            continue
         number = -1
         if index >= 0:
             number = counterpart(actor.figure, chosen.figure.animations[index])
@@ -89,17 +92,6 @@ def _clips(
         clip = None if number < 0 else actor.figure.animations[number].clip()
         found[actor] = number, edited.get((actor, number), clip)
     return found
-
-
-def _of_one_file(state: AppState, chosen: Actor) -> list[Actor]:
-    """Return the actors with animations that were read from the chosen actor's file."""
-    if chosen.file is None:
-        return [chosen]
-    return [
-        actor
-        for actor in state.scene.actors
-        if actor.figure.animations and actor.file == chosen.file
-    ]
 
 
 def _put_aside(state: AppState, actor: Actor) -> None:

@@ -422,10 +422,6 @@ def ask_where_to_save_rig(state: AppState, result: Result) -> None:
         "Save rigged mesh: .npz, .glb, or .skel with .skin, .obj and .json",
         RIGGED_SUFFIXES,
         name,
-        written=_written,
+        # Other suffixes are rejected on saving.
+        written=lambda path: files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path],
     )
-
-
-def _written(path: Path) -> list[Path]:
-    """Return all files written for a name; other suffixes are rejected on saving."""
-    return files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path]

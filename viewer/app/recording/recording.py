@@ -1,8 +1,14 @@
-"""The Record window: settings for images, a contact sheet or a video of the view; its preview."""
+"""Recording of the view as images, a contact sheet or a video: its window, preview and steps.
+
+The steps draw one frame each; between them, the window stays responsive.
+"""
 
 from __future__ import annotations
 
-import copy
+import contextlib
+from collections.abc import Generator, Sequence
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +16,7 @@ from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following
 from viewer.app.core.fields import begin_field, in_row
+from viewer.app.core.jobs import FrameJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field, whole_field
@@ -24,18 +31,28 @@ from viewer.app.core.widgets import (
     note_item,
 )
 from viewer.app.files.files import ask_where_to_write
+from viewer.app.linting.lint_panel import Linting
+from viewer.app.linting.marks import marks_of
+from viewer.app.weights.vertex_panel import vertex_annotation
+from viewer.app.weights.weights_panel import Weights
 from viewer.data_classes import dataclass, setting
-from viewer.formats import file_stem
+from viewer.errors import OutputError, ViewerError
+from viewer.formats import check_targets, file_stem
+from viewer.lint import Finding, places_of
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
-from viewer.phrases import counted
+from viewer.phrases import counted, printable
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import QUALITIES, SIZE, DisplayOptions
-from viewer.rendering.recorder import Follow
+from viewer.rendering.overlay.annotation import Annotation, mark_annotation
+from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
+from viewer.rig.inspection.explanation import explain as explain_vertex
 from viewer.rig.motion.timing import frame_at, frame_times
 from viewer.rig.number_text import number_text
+from viewer.rig.scene import Scene
 
 _SIZES = {
     "view": "size of the view",
@@ -56,7 +73,6 @@ _BACKGROUNDS = {
     "environment": "studio",
     "transparent": "transparent",
 }
-_TITLE = "Record"
 _WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
@@ -154,7 +170,7 @@ class Preview:
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        options = recorded_options(state, settings, 2)
+        options = _recorded_options(state, settings, 2)
         target = self.target
         if target is None or (target.size, target.asked_samples) != (size, options.samples):
             self._retire()
@@ -200,7 +216,7 @@ def draw_record_dialog(state: AppState) -> None:
     settings = recording.settings
     if settings is None:
         return
-    shown, stays = begin_window(_TITLE, _WINDOW)
+    shown, stays = begin_window("Record", _WINDOW)
     if shown:
         # The buttons stay visible even if the settings need a scroll bar.
         if imgui.begin_child("##settings", (0.0, -1.2 * imgui.get_frame_height_with_spacing())):
@@ -356,9 +372,9 @@ def _start(state: AppState, path: Path) -> None:
     recording.wanted = path
 
 
-def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
+def _recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
     """Return a copy of the view's options for some frames; more than one is not drawn finally."""
-    options = copy.deepcopy(state.options)
+    options = deepcopy(state.options)
     if settings.look:
         options.quality = settings.look
     elif options.quality == "final" and n_frames > 1:
@@ -371,7 +387,7 @@ def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -
     return options
 
 
-def recorded_follow(state: AppState, settings: RecordSettings) -> Follow | None:
+def _recorded_follow(state: AppState, settings: RecordSettings) -> Follow | None:
     """Return the actor or joint that a recording's camera follows; None if it does not move."""
     following = state.of(Following)
     if not settings.follows or following.target is None or following.place is None:
@@ -418,3 +434,119 @@ def _preview_size(size: tuple[int, int]) -> tuple[int, int]:
     """
     factor = min(_WIDEST / size[0], _HIGHEST / size[1], 1.0)
     return max(round(factor * size[0]), 1), max(round(factor * size[1]), 1)
+
+
+class RecordedMarks:
+    """Annotations of the pinned vertex and the chosen finding, copied from the state."""
+
+    def __init__(self, state: AppState) -> None:
+        weights = state.of(Weights)
+        linting = state.of(Linting)
+        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
+        self._finding: Finding | None = linting.finding if linting.marks else None
+        self._skinning = deepcopy(state.options.skinning)
+        self._binding = state.options.show == "binding"
+
+    def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
+        """Return the annotations of one frame for an image's size in pixels."""
+        found = []
+        if self._finding is not None:
+            places = places_of(self._finding, scene, self._skinning, self._binding)
+            found.append(mark_annotation(marks_of(places)[0]))
+        pinned = self._pinned
+        if pinned is not None and not self._binding:
+            actor = scene.actors[pinned.actor]
+            if actor.pose is not None and actor.is_drawn:
+                why = explain_vertex(actor.figure, actor.pose, self._skinning, pinned.vertex)
+                found.append(vertex_annotation(why, actor, self._draws_lines, size))
+        return found
+
+
+def _recording_steps(
+    state: AppState,
+    programs: Programs,
+    settings: RecordSettings,
+    path: Path,
+    ghost: Ghost | None = None,
+) -> Generator[object, None, list[str]]:
+    """Record the playback range; ``{frame}`` in the path stands for the number of an image."""
+    times, numbers, rate = recorded_times(state, settings)
+    recording = Recording(
+        replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
+        times,
+        state.camera.copy(),
+        settings.pixels((state.view_rect[2], state.view_rect[3])),
+        _recorded_options(state, settings, len(times)),
+        numbers=numbers,
+        rate=rate,
+        box=state.box.copy(),
+        moves=state.clock.has_motion,
+        interpolate=state.clock.interpolate_gaps,
+        turntable=360.0 if settings.turntable else 0.0,
+        follow=_recorded_follow(state, settings),
+        selected=(state.chosen_actor, state.selected_joint),
+        annotations=RecordedMarks(state).at,
+    )
+    files = [path]
+    if settings.kind == "pictures":
+        files = _numbered(path, recording.numbers)
+    # The dialog asks before replacing a single file, but not for numbered files.
+    is_asked = settings.kind != "pictures"
+    check_targets(files, state.inputs, is_asked, hint="choose another name")
+    sink = _sink(settings, files, recording)
+    recording.size = getattr(sink, "cell", recording.size)
+    renderer = Renderer(programs)
+    renderer.ghost = ghost
+    try:
+        # The recording must be closed before its renderer, even if this generator is closed.
+        with contextlib.closing(record(recording, renderer, sink)) as steps:
+            yield from steps
+    except (ViewerError, GeneratorExit):
+        kept = getattr(sink, "n_written", 0)
+        if kept:
+            state.say(f"{kept} of {len(files)} pictures were written, and are kept")
+        raise
+    finally:
+        renderer.release()
+    name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
+    notes = [*getattr(sink, "notes", []), *renderer.notes]
+    width, height = recording.size
+    return [f"Saved {name}: {recording.n_frames} frames, {width} x {height}", *notes]
+
+
+def _numbered(path: Path, numbers: Sequence[int]) -> list[Path]:
+    try:
+        files = [path.with_name(path.name.format(frame=number)) for number in numbers]
+    except (ValueError, KeyError, IndexError, AttributeError):
+        files = []
+    if len(set(files)) < len(numbers):
+        raise OutputError(
+            f"{printable(path, 300)}: expected a name with {{frame}}, as in "
+            f"{printable(path.stem)}_{{frame:05}}.png"
+        )
+    return files
+
+
+def _sink(settings: RecordSettings, files: list[Path], recording: Recording) -> Sink:
+    """Return the sink of the frames; that of a contact sheet has the size of its cells."""
+    from viewer.media.picture_sinks import PictureSink, SheetSink
+
+    if settings.kind == "pictures":
+        return PictureSink(files)
+    if settings.kind == "sheet":
+        return SheetSink(files[0], recording.size, recording.numbers)
+    from viewer.media.video import VideoSink
+
+    quality, is_transparent = settings.quality, settings.is_transparent
+    return VideoSink(files[0], recording.size, recording.rate, quality, is_transparent)
+
+
+def start_recording(state: AppState, renderer: Renderer) -> None:
+    """Start a requested recording unless another job is running."""
+    recording = state.of(RecordingState)
+    path, settings, recording.wanted = recording.wanted, recording.settings, None
+    if path is None or settings is None or state.job is not None:
+        return
+    steps = _recording_steps(state, renderer.programs, replace(settings), path, renderer.ghost)
+    state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps, "recording")
+    state.clock.playing, recording.settings = False, None
