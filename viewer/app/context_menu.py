@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from viewer.app.actors.following import Following, toggle_following
 from viewer.app.actors.parts_panel import isolate_part, part_label, set_part_shown
 from viewer.app.core.reasons import no_pose, no_skeleton
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import begin_menu, menu_item
 from viewer.app.palette import toggle_palette
 from viewer.app.posing.joint_tree import select_joint
@@ -20,7 +20,6 @@ from viewer.app.view.hovering import Picking
 from viewer.app.view.picks import Spot, spot_at
 from viewer.app.weights.weights_panel import Weights, no_view, pin_vertex, show_scalar, unpin
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.renderer import Renderer
 from viewer.rig.skeleton import joint_label
@@ -39,6 +38,7 @@ class ContextMenu:
     """Whether the menu opens in the next frame."""
 
 
+@shows_errors
 def answer_right_click(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float
 ) -> None:
@@ -47,11 +47,7 @@ def answer_right_click(
     place, picking.menu_at = picking.menu_at, None
     if place is None:
         return
-    try:
-        menu.spot = spot_at(state, renderer, size, (place[0] * scale, place[1] * scale))
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    menu.spot = spot_at(state, renderer, size, (place[0] * scale, place[1] * scale))
     menu.is_wanted = True
 
 

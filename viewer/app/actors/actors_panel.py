@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.actors.following import Following, stop_following, toggle_following
 from viewer.app.core.camera_moves import look_through_view
 from viewer.app.core.fields import begin_field, drag_float, in_row
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -19,7 +19,6 @@ from viewer.app.core.widgets import (
     visible_rows,
 )
 from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
-from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.captures.keypoint_layouts import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
@@ -198,16 +197,13 @@ def _draw_space(state: AppState) -> None:
         switch_space(state, chosen)
 
 
+@shows_errors
 def switch_space(state: AppState, space: str) -> None:
     """Read the people again in another space, which discards edits of their motions and undo."""
     old = state.scene
     if old.in_space is None:
         return
-    try:
-        scene = old.in_space(space)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    scene = old.in_space(space)
     for actor in scene.actors:
         _dress(actor, old.actors)
     time, chosen, joint = state.clock.time, state.actor, state.selected_joint

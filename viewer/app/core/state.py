@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field
+from functools import wraps
 from pathlib import Path
-from typing import TypeVar
+from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from viewer.app.core.scene_version import SceneVersion, version_of
 from viewer.app.core.undo_history import History
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
@@ -30,6 +32,22 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 _FARTHEST = 1e4  # maximum distance of the camera, relative to the scene's size
 Part = TypeVar("Part")
+_Rest = ParamSpec("_Rest")
+
+
+def shows_errors(
+    act: Callable[Concatenate[AppState, _Rest], None],
+) -> Callable[Concatenate[AppState, _Rest], None]:
+    """Return an action that shows the message of a ``ViewerError`` and does nothing more."""
+
+    @wraps(act)
+    def run(state: AppState, /, *rest: _Rest.args, **named: _Rest.kwargs) -> None:
+        try:
+            act(state, *rest, **named)
+        except ViewerError as problem:
+            state.error = str(problem)
+
+    return run
 
 
 @dataclass(slots=True)

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import WARNING, text_color
 from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
@@ -78,6 +79,14 @@ def show_tooltip(text: str) -> None:
     """Show a tooltip, unless it would cover text being typed, or a drag, in the last widget."""
     if not imgui.is_item_active():
         imgui.set_tooltip(text)
+
+
+def filter_field(state: AppState, label: str, text: str, hint: str, width: float = -1.0) -> str:
+    """Draw a search field and return its text; ``width``: window coordinates, -1 for the line."""
+    imgui.set_next_item_width(width)
+    found = search_field(f"##{label}", text, hint)
+    note_item(state, label)
+    return found
 
 
 def warning(text: str) -> None:

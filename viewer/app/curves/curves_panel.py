@@ -9,11 +9,12 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import number_field, search_field
+from viewer.app.core.text_fields import number_field
 from viewer.app.core.widgets import (
     button,
     choice,
     explain,
+    filter_field,
     note_item,
     plain_zero,
     same_line_if_room,
@@ -125,9 +126,7 @@ def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
 
 def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
     view = state.of(Curves)
-    imgui.set_next_item_width(-1.0)
-    view.filter = search_field("##curve filter", view.filter, "Filter channels")
-    note_item(state, "Curve filter")
+    view.filter = filter_field(state, "Curve filter", view.filter, "Filter channels")
     if not imgui.begin_child("##curve rows"):
         imgui.end_child()
         return

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.saved_work import Animations, SavedPose, SavedWork, keep_edited
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import button
 from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
 from viewer.app.files.recent import remember
@@ -356,15 +356,12 @@ def take_loaded(
     return False
 
 
+@shows_errors
 def _add(state: AppState, contents: Contents) -> None:
     """Apply poses and textures to the chosen actor."""
     saved = state.of(SavedWork)
     state.observe()
-    try:
-        actor, notes = add_to_actor(contents, state.actor)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    actor, notes = add_to_actor(contents, state.actor)
     if actor is not state.actor:
         keep_edited(state.of(Animations), state.actor, actor)
         state.history.exchange_actor(state.actor, actor)

@@ -8,11 +8,10 @@ from imgui_bundle import imgui
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files, open_files
-from viewer.errors import ViewerError
 from viewer.models import found_models, known_models, load_model_folder, save_model_folder
 from viewer.models.download import ADDABLE, CATALOG, Publication, add_model
 from viewer.phrases import counted, printable
@@ -87,13 +86,10 @@ def ask_for_model_folder(state: AppState) -> None:
     state.of(Files).dialog = dialog
 
 
+@shows_errors
 def set_model_folder(state: AppState, paths: list[Path]) -> None:
     """Remember the first path as the folder of body models, and show how many it contains."""
-    try:
-        folder = save_model_folder(paths[0])
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    folder = save_model_folder(paths[0])
     state.of(Files).model_folder = folder
     count = len(known_models(folder))
     state.say(f"{counted(count, 'body model')} in {printable(folder, 200)}")

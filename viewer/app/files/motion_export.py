@@ -17,13 +17,13 @@ from viewer.app.core.saved_work import (
     edited_aside,
     with_edited_keys,
 )
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_item
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_where_to_write
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.errors import RigError, ViewerError
+from viewer.errors import RigError
 from viewer.export import (
     EXPORTERS,
     FOLDER,
@@ -169,6 +169,7 @@ def _is_one_file(path: Path) -> bool:
     return any(is_together(kind, path, ExportOptions()) for kind in kinds)
 
 
+@shows_errors
 def save_motion(
     state: AppState, path: Path, everyone: bool = False, safe_names: bool = False
 ) -> None:
@@ -181,18 +182,14 @@ def save_motion(
     if why := no_job_room(state):
         state.error = why
         return
-    try:
-        motions, selected, left_out = _motions(state, path, everyone)
-        kind = suited_exporter(path, motions[0].actor.figure)
-        files = motion_files(state, path, everyone)
-        # The dialog has already asked whether to replace existing files.
-        if path.suffix:
-            check_targets(files, state.inputs, force=True)
-        else:
-            check_folder_target(files[0], state.inputs, force=True)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    motions, selected, left_out = _motions(state, path, everyone)
+    kind = suited_exporter(path, motions[0].actor.figure)
+    files = motion_files(state, path, everyone)
+    # The dialog has already asked whether to replace existing files.
+    if path.suffix:
+        check_targets(files, state.inputs, force=True)
+    else:
+        check_folder_target(files[0], state.inputs, force=True)
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
     options = ExportOptions(kind, skinning=replace(state.options.skinning), safe_names=safe_names)
     has_still = everyone and "pose" in EXPORTERS[kind].stores and _is_one_file(path)

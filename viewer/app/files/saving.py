@@ -9,7 +9,7 @@ from pathlib import Path
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.errors import ViewerError
 from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
@@ -17,20 +17,19 @@ from viewer.progress import report
 from viewer.rig.arrays import Bytes
 
 
+@shows_errors
 def save_files(
     state: AppState, act: Callable[[], object], files: list[Path], saved: object = None
 ) -> None:
     """Write files unless the scene was read from one of them, and show the result."""
-    try:
-        # The dialog has already asked whether to replace existing files.
-        check_targets(files, state.inputs, force=True)
-        act()
-        state.of(SavedWork).add(saved)
-        state.say(_saved(files))
-    except ViewerError as problem:
-        state.error = str(problem)
+    # The dialog has already asked whether to replace existing files.
+    check_targets(files, state.inputs, force=True)
+    act()
+    state.of(SavedWork).add(saved)
+    state.say(_saved(files))
 
 
+@shows_errors
 def save_in_background(
     state: AppState,
     act: Callable[[], Iterable[object]],
@@ -42,12 +41,8 @@ def save_in_background(
     if why := no_job_room(state):
         state.error = why
         return
-    try:
-        # The dialog has already asked whether to replace existing files.
-        check_targets(files, [*state.inputs, *inputs], force=True)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    # The dialog has already asked whether to replace existing files.
+    check_targets(files, [*state.inputs, *inputs], force=True)
 
     def write() -> list[str]:
         with all_or_none(files):

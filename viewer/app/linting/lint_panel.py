@@ -14,12 +14,12 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.scene_version import ActorVersion, SceneVersion
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import WARNING, ink, text_color
 from viewer.app.core.widgets import (
     button,
     choice,
     explain,
+    filter_field,
     note_item,
     same_line_if_room,
     slider,
@@ -250,9 +250,7 @@ def _draw_filters(state: AppState, known: Checked) -> None:
         note_item(state, f"lint {severity}")
         if changed:
             view.severities ^= {severity}
-    imgui.set_next_item_width(-1.0)
-    view.text = search_field("##lint filter", view.text, "Filter findings")
-    note_item(state, "Filter findings")
+    view.text = filter_field(state, "Filter findings", view.text, "Filter findings")
 
 
 def _draw_list(state: AppState, known: Checked) -> None:

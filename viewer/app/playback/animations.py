@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.core.saved_work import Animations
-from viewer.app.core.state import AppState
-from viewer.errors import FormatError
+from viewer.app.core.state import AppState, shows_errors
 from viewer.phrases import printable
 from viewer.rig.motion.animation_choice import (
     animation_labels,
@@ -48,16 +47,13 @@ def animation_texts(actor: Actor) -> dict[int, str]:
     return texts
 
 
+@shows_errors
 def choose_animation(state: AppState, index: int) -> None:
     """Play an animation of the chosen actor from its start, in all figures of its file."""
     chosen = state.actor
     if index == played(chosen) or not -1 <= index < len(chosen.figure.animations):
         return
-    try:
-        clips = _clips(state, chosen, index)
-    except FormatError as problem:
-        state.error = str(problem)
-        return
+    clips = _clips(state, chosen, index)
     for actor, (number, clip) in clips.items():
         _put_aside(state, actor)  # edited keys are kept while other animations play
         play_animation(actor, number, clip)

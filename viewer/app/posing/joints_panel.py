@@ -10,11 +10,11 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import ink
 from viewer.app.core.widgets import (
     button,
     checkbox,
+    filter_field,
     is_reset,
     menu_item,
     note_item,
@@ -155,10 +155,8 @@ def _draw_actor_choice(state: AppState) -> None:
 
 def _draw_head(state: AppState) -> None:
     posing = state.of(Posing)
-    imgui.set_next_item_width(-1.0)
     tree = joint_tree(state)
-    tree.filter = search_field("##filter", tree.filter, "Filter joints")
-    note_item(state, "Filter")
+    tree.filter = filter_field(state, "Filter", tree.filter, "Filter joints")
     if button(state, with_key(state, "Reset", "R")):
         reset_pose(state)
     same_line_if_room("Pose…")
@@ -382,11 +380,9 @@ def _draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) ->
     )
     imgui.text_disabled(_seen_text(state, points))
     imgui.pop_text_wrap_pos()
-    imgui.set_next_item_width(-1.0)
     tree = joint_tree(state)
-    tree.filter = search_field("##filter", tree.filter, "Filter points")
-    note_item(state, "Filter")
-    wanted = joint_tree(state).filter.lower()
+    tree.filter = filter_field(state, "Filter", tree.filter, "Filter points")
+    wanted = tree.filter.lower()
     shown = [row for row, name in enumerate(layout.names) if wanted in name.lower()]
     if imgui.begin_child("points", (0.0, 0.0)):
         if not shown:

@@ -11,7 +11,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.saved_work import SavedPose
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files, save_in_background
@@ -173,6 +173,7 @@ def copy_numbers(state: AppState) -> None:
     state.say_status(f"Pose copied as {len(numbers)} numbers")
 
 
+@shows_errors
 def paste_pose(state: AppState) -> None:
     """Pose the chosen actor from the clipboard: JSON, or the model's raw pose vector."""
     from viewer.formats import pose
@@ -182,19 +183,15 @@ def paste_pose(state: AppState) -> None:
     if actor.pose is None:
         return
     text = imgui.get_clipboard_text() or ""
-    try:
-        # Numbers may be separated by commas, as in the list syntax of programming languages.
-        cleaned = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
-        source = Source("clipboard", cleaned.encode("utf-8", "replace"))
-        if not text.strip():
-            raise source.fault("F002.pose-clipboard: expected a pose, found no text")
-        # A pose copied from a figure with different DOFs is transferred joint by joint: JSON
-        # contains the joint rotations.
-        record = pose.read(source)
-        notes = apply_pose(source.path, record, actor, drop_excess=False)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    # Numbers may be separated by commas, as in the list syntax of programming languages.
+    cleaned = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
+    source = Source("clipboard", cleaned.encode("utf-8", "replace"))
+    if not text.strip():
+        raise source.fault("F002.pose-clipboard: expected a pose, found no text")
+    # A pose copied from a figure with different DOFs is transferred joint by joint: JSON
+    # contains the joint rotations.
+    record = pose.read(source)
+    notes = apply_pose(source.path, record, actor, drop_excess=False)
     state.say(*source.diagnostics.warnings, *notes)
     state.say_status("Pose pasted")
     pause_for_edit(state)
@@ -218,13 +215,10 @@ def save_pose(state: AppState, path: Path) -> None:
         save_files(state, act, [path], _saved(actor))
 
 
+@shows_errors
 def save_export(state: AppState, path: Path) -> None:
     """Write the chosen actor in its current pose for other programs, in the background."""
-    try:
-        files = files_written(path)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    files = files_written(path)
     # Edits made during the export must not change the written pose.
     actor = upright_actor(state.scene, state.actor).copy()
     skinning = replace(state.options.skinning)

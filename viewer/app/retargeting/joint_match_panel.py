@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_drive
 from viewer.app.core.saved_work import SavedWork
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import WARNING, faint, ink
 from viewer.app.core.widgets import (
@@ -19,6 +19,7 @@ from viewer.app.core.widgets import (
     checkbox,
     disabled,
     explain,
+    filter_field,
     note_item,
     same_line_if_room,
     visible_rows,
@@ -160,9 +161,8 @@ def draw(state: AppState) -> None:
                 act(state)
             explain(what)
         width = imgui.calc_text_size("Only unmatched").x + 2.0 * imgui.get_frame_height()
-        imgui.set_next_item_width(max(imgui.get_content_region_avail().x - width, width))
-        view.filter = search_field("##match filter", view.filter, "Filter joints")
-        note_item(state, "Filter joints")
+        width = max(imgui.get_content_region_avail().x - width, width)
+        view.filter = filter_field(state, "Filter joints", view.filter, "Filter joints", width)
         imgui.same_line()
         view.only_unmatched = checkbox(state, "Only unmatched", view.only_unmatched)
         _draw_table(state, shown, hovered[0])
@@ -471,16 +471,13 @@ def ask_where_to_save(state: AppState) -> None:
     ask_where_to_write(state, _save, "Save joint map", _SUFFIXES, name)
 
 
+@shows_errors
 def _load(state: AppState, paths: list[Path]) -> None:
     """Apply a joint map file to the chosen figure."""
     if no_edit(state):
         state.say_status(no_edit(state))
         return
-    try:
-        joint_map = read_joint_map(Source.open(paths[0]))
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    joint_map = read_joint_map(Source.open(paths[0]))
     state.of(SavedWork).add(joint_map)
     text = f"Joints matched by {printable(paths[0], 200)}"
     _apply(state, joint_map, lambda: state.say_status(text))

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.theme import WARNING, text_color
 from viewer.app.core.widgets import (
     button,
@@ -28,7 +28,6 @@ from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Comparison, Result, Rigging, no_results
 from viewer.autorig.rigged import clip_for
-from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
 from viewer.phrases import printable
@@ -249,6 +248,7 @@ def _no_motion_of(result: Result | None) -> str:
     return "the template has no motion: it needs one before Run is pressed"
 
 
+@shows_errors
 def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
@@ -259,12 +259,8 @@ def _set_motion(state: AppState, result: Result, plays: bool) -> None:
         actor.clip, actor.pose = None, rigged.pose.copy()
         actor.placement = place @ rigged.placement
         return
-    try:
-        actor.clip = clip_for(rigged, clip)
-        state.of(SavedWork).add(actor.keyed)
-    except RigError as problem:
-        state.error = str(problem)
-        return
+    actor.clip = clip_for(rigged, clip)
+    state.of(SavedWork).add(actor.keyed)
     # The clip sets the same DOFs as the template's; the target's rotation is not part of it.
     actor.pose = figure_pose(rigged.figure)
     actor.offset = result.template.actor.offset if result.template.actor else 0.0
@@ -276,13 +272,10 @@ def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     actor.placement = place @ matrix
 
 
+@shows_errors
 def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result in the background: all of its files or none."""
-    try:
-        files = files_of(path)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    files = files_of(path)
     inputs = result.template.paths
     save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, result)
 

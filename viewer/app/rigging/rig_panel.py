@@ -14,10 +14,10 @@ from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field
 from viewer.app.core.widgets import (
     button,
-    checkbox,
     choice,
     count_slider,
     disabled,
+    draw_setting,
     explain,
     note_item,
     plain_zero,
@@ -61,10 +61,9 @@ from viewer.app.rigging.work import (
     start_reading,
     start_run,
 )
-from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.alignment.surface_alignment import SCALES, Alignment, AlignmentSettings
-from viewer.autorig.settings import JOINTS, METHODS
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.settings import METHODS
 from viewer.errors import ViewerError
 from viewer.formats import MESHES
 from viewer.loading.placing import placed_like
@@ -95,7 +94,6 @@ _FITS = (
     "; joints are rotated and limbs resized, or the whole template is stretched, if that fits much "
     "better"
 )
-_SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
 
 def draw(state: AppState) -> None:
@@ -222,7 +220,7 @@ def _draw_match(state: AppState) -> None:
 def _draw_run(state: AppState) -> None:
     """Draw the settings of the transfer, and the buttons that start it."""
     choices = state.of(Rigging).choices
-    choices.method = choice(state, "Method", choices.method, {name: name for name in METHODS})
+    draw_setting(state, "Method", choices, "method")
     explain(METHODS[choices.method])
     _draw_advanced(state, choices)
     why = no_job_room(state)
@@ -246,14 +244,10 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
         return
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(state, why):
-        choices.refines = checkbox(state, "Refine alignment", choices.refines)
-        explain("refine the result of the search or of the landmarks by closest points", why)
-        choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
-        explain(
-            "surface: joints are placed by the surface around them; alignment: only by the "
-            "alignment",
-            why,
-        )
+        text = "refine the result of the search or of the landmarks by closest points"
+        draw_setting(state, "Refine alignment", choices, "refines", text, why)
+        text = "surface: joints are placed by the surface around them; alignment: only by the "
+        draw_setting(state, "Joints##rig", choices, "joints", f"{text}alignment", why)
         limits = (0, _MOST_ITERATIONS)
         count = count_slider(state, "Smoothing", choices.smoothing, limits)
         explain("smoothing iterations for inpainted weights", why)
@@ -263,8 +257,8 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
         most = count_slider(state, "Max. influences", choices.max_influences, limits, text)
         explain("number of influences to keep per vertex, largest first; 0 keeps all", why)
         choices.max_influences = max(most, 0)
-        choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
-        explain("transfer the template's pose correctives, if any", why)
+        text = "transfer the template's pose correctives, if any"
+        draw_setting(state, "Pose correctives", choices, "correctives", text, why)
     imgui.tree_pop()
 
 
@@ -272,14 +266,11 @@ def _draw_alignment(state: AppState) -> None:
     """Draw the settings of the alignment, its error, and the tools to move the template by hand."""
     rigging, why = state.of(Rigging), no_job_room(state)
     choices = rigging.choices
-    axes = {"": "automatic", **{axis: axis for axis in AXES}}
-    choices.up = choice(state, "Up", choices.up, axes)
-    explain("up axis of the target")
-    choices.facing = choice(state, "Facing", choices.facing, axes)
-    explain("forward axis of the target")
-    choices.scale = choice(state, "Scale", choices.scale, {s: _SCALE_TEXTS[s] for s in SCALES})
-    choices.fits = checkbox(state, "Fit pose and proportions", choices.fits)
-    explain("rotate the template's joints and resize its limbs where the target differs")
+    draw_setting(state, "Up", choices, "up", "up axis of the target")
+    draw_setting(state, "Facing", choices, "facing", "forward axis of the target")
+    draw_setting(state, "Scale", choices, "scale")
+    text = "rotate the template's joints and resize its limbs where the target differs"
+    draw_setting(state, "Fit pose and proportions", choices, "fits", text)
     if button(state, "Align", why):
         start_align(state)
     explain(f"find the best placement by closest points{_FITS if choices.fits else ''}")
@@ -413,7 +404,7 @@ def _draw_landmarks(state: AppState, template: Template) -> None:
             imgui.same_line()
     if removed >= 0:
         del view.landmarks[removed]
-    view.choices.refines = checkbox(state, "Refine by closest points", view.choices.refines)
+    draw_setting(state, "Refine by closest points", view.choices, "refines")
     missing = _FEWEST - len(view.landmarks)
     why = f"{missing} more pair{'s' * (missing != 1)} needed" if missing > 0 else ""
     if button(state, "Align by landmarks", why or no_job_room(state)):

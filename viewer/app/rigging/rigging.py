@@ -10,12 +10,13 @@ import numpy as np
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.correspondence import MAX_ANGLE
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import TransferSettings
-from viewer.data_classes import dataclass
+from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.formats import MESHES
@@ -45,6 +46,8 @@ GHOSTS = {"": "hidden", "translucent": "translucent", "wireframe": "wireframe", 
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
 _USUAL = TransferSettings()
+_AXES = {"": "automatic", **{axis: axis for axis in AXES}}
+_SCALES = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 _posed: Memo[Skin, Mesh] = Memo()
 
 
@@ -134,21 +137,21 @@ class Running:
 class RigChoices:
     """Settings of the panel's controls."""
 
-    up: str = ""
-    facing: str = ""
+    up: str = setting("", choices=_AXES)
+    facing: str = setting("", choices=_AXES)
     """Up and forward axes of the target; empty to search for them."""
-    scale: str = _USUAL.alignment.scale
-    refines: bool = _USUAL.alignment.refines
-    fits: bool = _USUAL.fits
-    method: str = _USUAL.method
-    joints: str = _USUAL.joints
+    scale: str = setting(_USUAL.alignment.scale, choices=_SCALES)
+    refines: bool = setting(_USUAL.alignment.refines)
+    fits: bool = setting(_USUAL.fits)
+    method: str = setting(_USUAL.method, choices={name: name for name in METHODS})
+    joints: str = setting(_USUAL.joints, choices={name: name for name in JOINTS})
     max_distance: float = _USUAL.weights.match.max_distance
     max_angle: float = MAX_ANGLE
     """In degrees; the others are those of ``TransferSettings``."""
     smoothing: int = _USUAL.weights.smoothing_rounds
     max_influences: int = 0
     """Maximum number of influences per vertex; 0 for all."""
-    correctives: bool = _USUAL.correctives
+    correctives: bool = setting(_USUAL.correctives)
 
 
 @dataclass(slots=True)

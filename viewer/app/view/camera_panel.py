@@ -6,7 +6,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.camera_moves import fit_again, fit_points, fit_shown, look_through_view
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -19,7 +19,6 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
-from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.camera import VIEWS, front_azimuth, look_from
 from viewer.rendering.camera_views import image_notes, lens_notes
@@ -141,17 +140,14 @@ def face(state: AppState, front: Front) -> None:
     fit_again(state)
 
 
+@shows_errors
 def look_through(state: AppState, index: int) -> None:
     """Look through a calibrated camera of the capture; -1 frees the camera at its position."""
     if index < 0:
         state.camera.fixed = None
         return
     view = state.scene.views[index]
-    try:
-        look_through_view(state, view)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    look_through_view(state, view)
     for note in (*image_notes(state.scene, view), *lens_notes(state.scene, view)):
         state.say(note[0].upper() + note[1:])
 

@@ -11,7 +11,6 @@ from viewer.app.posing.toolbar import no_tool
 from viewer.app.view.axis_gizmo import is_over_gizmo
 from viewer.app.weights.weights_panel import Weights, wants_vertex
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.visibility import has_joint_marks, shows_skeleton
 from viewer.rig.skeleton import joint_label
@@ -71,11 +70,7 @@ def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scal
         return
     hovered.is_waiting = False
     x, y = (scale * (place[axis] - state.view_rect[axis]) for axis in range(2))
-    try:
-        pick = renderer.pick(state.scene, state.camera, state.options, size, x, y, state.box)
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
+    pick = renderer.pick(state.scene, state.camera, state.options, size, x, y, state.box)
     hovered.actor = -1 if pick is None else pick.actor
 
 

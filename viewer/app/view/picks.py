@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import Posing
@@ -16,7 +16,6 @@ from viewer.app.view.hovering import Picking, hover_actor, joint_near
 from viewer.app.weights.vertex_panel import shows_vertex_info
 from viewer.app.weights.weights_panel import Hover, Weights, pin_vertex, wants_vertex
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
@@ -36,20 +35,18 @@ _LONGEST = 40  # maximum length of a name in characters
 _REST = 0.2  # seconds without mouse movement before a vertex is described
 
 
+@shows_errors
 def answer_picks(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
     """Handle the pending click, and describe the vertex under the mouse once the mouse is still."""
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
-    try:
-        if wanted is not None:
-            x, y, aims = wanted
-            _take_click(state, renderer, size, (x * scale, y * scale), aims)
-        _look_under_mouse(state, renderer, size, scale, picture)
-        hover_actor(state, renderer, size, scale)
-    except ViewerError as problem:
-        state.error = str(problem)
+    if wanted is not None:
+        x, y, aims = wanted
+        _take_click(state, renderer, size, (x * scale, y * scale), aims)
+    _look_under_mouse(state, renderer, size, scale, picture)
+    hover_actor(state, renderer, size, scale)
 
 
 def _take_click(

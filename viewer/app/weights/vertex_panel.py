@@ -27,7 +27,6 @@ from viewer.app.files.files import Files
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.weights_panel import Weights, explained, toggle_picking, unpin
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.colors import joint_palette
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
@@ -72,12 +71,7 @@ class _Sheet:
 def draw(state: AppState) -> None:
     """Draw the panel."""
     weights = state.of(Weights)
-    try:
-        explanation = explained(state)
-    except ViewerError as problem:
-        state.error = str(problem)
-        unpin(state)
-        return
+    explanation = explained(state)
     pinned = weights.pinned
     if explanation is None or pinned is None or pinned.figure.skeleton is None:
         imgui.text_wrapped("Alt+click a vertex to explain its position here.")
@@ -267,12 +261,7 @@ def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotati
     pinned = view.pinned
     if pinned is None or state.options.show == "binding":
         return ()
-    try:
-        explanation = explained(state)
-    except ViewerError as problem:
-        state.error = str(problem)
-        unpin(state)
-        return ()
+    explanation = explained(state)
     if explanation is None or not state.scene.actors[pinned.actor].is_drawn:
         return ()
     actor = state.scene.actors[pinned.actor]

@@ -27,6 +27,7 @@ from viewer.app.core.widgets import (
 from viewer.app.layout import is_open, set_open, show_panel
 from viewer.app.posing.joint_tree import select_joint
 from viewer.data_classes import dataclass
+from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.scalar_look import TYPICAL
@@ -378,7 +379,7 @@ def unpin(state: AppState) -> None:
 
 
 def explained(state: AppState) -> Explanation | None:
-    """Return the pinned vertex's explanation in the pose, or None; ``ViewerError`` for shapes."""
+    """Return the pinned vertex's explanation in the current pose; None if none is pinned."""
     view, actors = state.of(Weights), state.scene.actors
     pinned = view.pinned
     if pinned is None:
@@ -393,8 +394,13 @@ def explained(state: AppState) -> Explanation | None:
         return None
     key = (pinned, pose_key(pose), repr(state.options.skinning))
     if key != view.explanation_key:
-        view.explanation = explain_vertex(
-            pinned.figure, pose, state.options.skinning, pinned.vertex
-        )
+        try:
+            view.explanation = explain_vertex(
+                pinned.figure, pose, state.options.skinning, pinned.vertex
+            )
+        except ViewerError as problem:  # the figure's shapes cannot be read
+            state.error = str(problem)
+            unpin(state)
+            return None
         view.explanation_key = key
     return view.explanation
