@@ -52,19 +52,13 @@ class Tails:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """Joints that depend on those of the previous levels only.
+    """Joints that depend on those of the previous levels only."""
 
-    ``joints``, ``parents`` (L,): indices of joints; a parent may be -1.
-    ``rows`` (N',): indices of the spring joints among them; ``places`` (N',): their positions in
-    ``joints``.
-    ``hits``: pairs of positions in ``rows`` and colliders, one collider per spring joint at a time.
-    """
-
-    joints: Ints
-    parents: Ints
-    rows: Ints
-    places: Ints
-    hits: tuple[tuple[Ints, Ints], ...]
+    joints: Ints  # (L,)
+    parents: Ints  # (L,), -1 for a root
+    rows: Ints  # (N',), the spring joints among them
+    places: Ints  # (N',), their positions in joints
+    hits: tuple[tuple[Ints, Ints], ...]  # positions in rows and colliders, one collider at a time
 
 
 class Simulation:
