@@ -17,7 +17,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.file_record import StoredTextures
+from viewer.rig.file_record import Json, StoredTextures
 from viewer.rig.material import Material
 from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
@@ -73,7 +73,7 @@ class NodeFile:
     """Spring nodes (instead of joints)."""
     named_nodes: frozenset[int] = frozenset()
     """Further nodes that must become joints, because extensions refer to them."""
-    toon: Mapping[int, Any] = field(default_factory=dict)
+    toon: Mapping[int, Json] = field(default_factory=dict)
     """Toon and unlit extensions of materials by index, as parsed from JSON."""
     old_members: tuple[str, ...] | None = None
     """Members of a VRM 0.x file that VRM 1.0 cannot hold; None for other files."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._source import Source
@@ -39,7 +38,7 @@ def read_humanoid(
     return found
 
 
-def given_bones(told: object, version: int) -> list[tuple[str, str, Any]]:
+def given_bones(told: object, version: int) -> list[tuple[str, str, object]]:
     """Return the place of each stated human bone in its list, its name in VRM 1.0, and its node."""
     bones = part(told, "humanoid", "humanBones")
     if version == 0 and isinstance(bones, list):

@@ -24,7 +24,6 @@ and rotations of texture coordinates are in revolutions per second.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -89,7 +88,9 @@ _OUTLINE_WIDTHS = (0.0, 0.01, 0.005)
 _WRITES_DEPTH = 3  # value of _BlendMode
 
 
-def upgraded_binds(told: object, materials: list[Any]) -> tuple[dict[str, list[Any]], list[str]]:
+def upgraded_binds(
+    told: object, materials: list[object]
+) -> tuple[dict[str, list[Json]], list[str]]:
     """Return an expression's changes in the terms of 1.0, and labels of those without effect."""
     colors: list[Json] = []
     moves: dict[int, Floats] = {}

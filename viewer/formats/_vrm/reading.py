@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from viewer.formats._scene_graph.content import NodeExpression, NodeFile
 from viewer.formats._scene_graph.surfaces import part_name
@@ -105,7 +104,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
 def _named_nodes(extensions: Mapping[str, object], n_nodes: int) -> frozenset[int]:
     """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` of the root name."""
     found: set[int] = set()
-    stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
+    stack: list[object] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
     while stack:
         told = stack.pop()
         if isinstance(told, list):

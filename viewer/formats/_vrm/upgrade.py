@@ -89,7 +89,7 @@ class Upgrade:
     """In file order."""
     ends: Mapping[int, Floats]
     """End of a chain in the space of its last joint, (3,), by a number that no node has."""
-    toon: Mapping[int, Any]
+    toon: Mapping[int, Json]
     """Toon and unlit extensions of materials, by index."""
     lost: list[str]
     """Members without a counterpart in version 1.0."""
@@ -366,9 +366,9 @@ def _vector(told: object) -> list[float] | None:
 
 def _colliders(
     data: object, n_nodes: int, lost: list[str]
-) -> tuple[list[Any], list[Any], dict[int, int]]:
+) -> tuple[list[Json], list[Json], dict[int, int]]:
     """Return the colliders, their groups, and the new place of each group that is not empty."""
-    colliders, groups, places = list[Any](), list[Any](), dict[int, int]()
+    colliders, groups, places = list[Json](), list[Json](), dict[int, int]()
     for index, each in enumerate(list_in(data, "colliderGroups")):
         own, node = [], part(each, "node")
         for number, sphere in enumerate(list_in(each, "colliders")):
@@ -386,9 +386,9 @@ def _colliders(
     return colliders, groups, places
 
 
-def _toon(properties: list[Any], known: Mapping[int, Any], lost: list[str]) -> dict[int, Any]:
+def _toon(properties: list[object], known: Mapping[int, Json], lost: list[str]) -> dict[int, Json]:
     """Return the extensions of materials, by index, from those they have and the properties."""
-    found: dict[int, Any] = {index: dict(each) for index, each in known.items()}
+    found: dict[int, Json] = {index: dict(each) for index, each in known.items()}
     offsets = _offsets(properties)
     for index, each in enumerate(properties):
         shader = part(each, "shader")
@@ -401,7 +401,7 @@ def _toon(properties: list[Any], known: Mapping[int, Any], lost: list[str]) -> d
     return found
 
 
-def _offsets(properties: list[Any]) -> dict[int, int]:
+def _offsets(properties: list[object]) -> dict[int, int]:
     """Return the order of transparent materials: 0 is last, or first if they write depth."""
     queues: dict[bool, dict[int, int]] = {False: {}, True: {}}
     for index, each in enumerate(properties):

@@ -377,7 +377,7 @@ def _check_uses(root: Json, report: _Report) -> None:
 
 def _uses(root: Json) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
     """Yield the accessors that are used, the kind of content, and the path to the reference."""
-    given: list[tuple[Any, str, tuple[str | int, ...]]] = []
+    given: list[tuple[object, str, tuple[str | int, ...]]] = []
     for m, mesh in objects_in(root, "meshes"):
         for p, primitive in objects_in(mesh, "primitives"):
             path: tuple[str | int, ...] = ("meshes", m, "primitives", p)
@@ -436,7 +436,7 @@ def _check_names(given: Json, path: tuple[str | int, ...], report: _Report) -> N
 
 
 def _check_types(
-    accessors: dict[int, Any], given: Json, path: tuple[str | int, ...], report: _Report
+    accessors: dict[int, Json], given: Json, path: tuple[str | int, ...], report: _Report
 ) -> None:
     for name, index in given.items():
         accessor = accessors.get(index, {}) if isinstance(index, int) else {}
@@ -449,7 +449,7 @@ def _check_types(
 
 
 def _check_targets(
-    accessors: dict[int, Any],
+    accessors: dict[int, Json],
     primitive: Json,
     given: Json,
     path: tuple[str | int, ...],
@@ -627,7 +627,7 @@ def _check_extensions(root: Json, report: _Report) -> None:
             at = ("extensionsRequired", place)
             report(wording.STRUCTURE, "a name that extensionsUsed contains", name, at)
     told: set[str] = set()
-    stack: list[tuple[Any, tuple[str | int, ...]]] = [(root, ())]
+    stack: list[tuple[object, tuple[str | int, ...]]] = [(root, ())]
     while stack:
         value, path = stack.pop()
         if isinstance(value, list):

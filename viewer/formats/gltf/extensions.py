@@ -152,7 +152,7 @@ def unkept_members(root: Json) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
+def _members(kind: str, listed: list[object], keeps_extras: bool) -> Iterator[str]:
     """Yield the members of the objects in a list, and of the objects within these."""
     for item in listed:
         if not isinstance(item, dict):

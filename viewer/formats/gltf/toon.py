@@ -103,7 +103,7 @@ def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
     return found
 
 
-def _omitted(told: Mapping[str, Any]) -> list[str]:
+def _omitted(told: Json) -> list[str]:
     """Return the members with an effect that is not drawn."""
     return [name for name, idle in _NOT_DRAWN.items() if told.get(name, idle) != idle]
 
@@ -130,7 +130,7 @@ def _toon(document: Document, element: Element) -> Toon:
     return Toon(values, used)
 
 
-def _rim(told: Mapping[str, Any]) -> Rim:
+def _rim(told: Json) -> Rim:
     """Return the rim light; invalid values are replaced by the extension's defaults."""
 
     def color(name: str, default: tuple[float, float, float]) -> Any:
@@ -150,7 +150,7 @@ def _rim(told: Mapping[str, Any]) -> Rim:
     )
 
 
-def _outline(told: Mapping[str, Any]) -> Outline | None:
+def _outline(told: Json) -> Outline | None:
     """Return the outline; None if there is none."""
     mode = _MODES.get(str(told.get("outlineWidthMode")), "")
     width = value_of(told.get("outlineWidthFactor"), 0.0)
@@ -162,7 +162,7 @@ def _outline(told: Mapping[str, Any]) -> Outline | None:
     return Outline(width, mode, (r, g, b), 1.0 if mix is None else min(max(mix, 0.0), 1.0))
 
 
-def stored_toon(document: Document) -> dict[int, Any]:
+def stored_toon(document: Document) -> dict[int, Json]:
     """Return the toon and unlit extensions of the materials, by index, as parsed from JSON."""
     found = {}
     for index, material in enumerate(list_in(document.root.values, "materials")):
