@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import fault_of, refusal_of
-from formats.anim_text import GOOD, parse
+from faults import Fault, fault_of, refusal_of, warnings_of
 from formats.synthetic_smpl import model
 
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
@@ -11,6 +10,17 @@ from viewer.formats import Source, detect, read, write
 from viewer.loading import load
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
+
+ONE = "channel { extrapolate cycle bounce keys 2 { 0 1 flat smooth 2 3 linear -0.5 } }"
+GOOD = f"animation {{ range -1 4 numchannels 1 {ONE} }}"
+
+
+def parse(text: str) -> tuple[Clip, list[Fault]]:
+    source = Source("walk.anim", text.encode())
+    clip = read(source)
+    assert isinstance(clip, Clip)
+    return clip, warnings_of(source.diagnostics)
+
 
 SKEL = "balljoint root { offset 0 0 0 }"
 

@@ -6,13 +6,18 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from formats.bvh.bvh_refusals import refusal
+from faults import Fault, refusal_of
 from formats.bvh_text import GOOD, one_joint, read
 from formats.test_mutations import mutate
 
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, bvh
 from viewer.rig.motion.evaluation import frames_of, world_frames
+
+
+def refusal(text: str) -> Fault:
+    return refusal_of(lambda: read(text))
+
 
 FRAMES = GOOD.partition("0.0333333\n")[2]
 

@@ -8,13 +8,22 @@ import numpy as np
 import pytest
 from faults import fault_of
 from formats.capture_files import body, noticed, opened, points, rows_of, write_frames
-from formats.easymocap.capture_faults import gap
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, easymocap
 from viewer.formats._text.json_places import line_at, nearest_place
 from viewer.phrases import listed, one_of
+
+
+def gap(tmp_path, content, kind="smpl"):
+    """Read three frames, the second of which is broken; return the messages about it."""
+    good = points(0) if kind == "keypoints3d" else body(0)
+    folder = write_frames(tmp_path / "smpl", {0: [good], 1: content, 2: [good]})
+    _, parts, _ = opened(tmp_path)
+    found = [person for part in parts for person in (*part.bodies, *part.points)]
+    assert found[:1] == [0]
+    return noticed(parts, folder / "000001.json"), parts
 
 
 def refusal(path, **options):

@@ -1,15 +1,86 @@
 """Hundreds of broken documents, each of which is read or refused in one line with the file name."""
 
-from collections.abc import Iterable
+import copy
+import json
+import random
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import pytest
-from formats.gltf.broken import changed, complete, truncated
-from formats.gltf.files import source_of, warned
+from formats.gltf.files import File, skinned, source_of, warned
 
 from viewer.diagnostics import Collector
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, read
 from viewer.formats.gltf import read_nodes
+
+VALUES: tuple[Any, ...] = (
+    *(-1, 0, 1, 7, 255, 2**31, 2**62, 10**400, 0.5, -3e38, 1e39, float("nan"), float("inf")),
+    *("", "x", "../x", "VEC3", "data:;base64,AAAA", "http://x/y", None, True, False),
+    *([], [0], [[]], [None], ["x"], [1e38] * 4, [0] * 16, {}, {"extensions": {}}, {"a": [{}]}),
+)
+"""Replacement values, and a marker for removal; see ``changed``."""
+
+
+def complete() -> File:
+    """Return a document with skinned and morphed meshes, animations, cameras and materials."""
+    file = skinned()
+    file.primitive["indices"] = file.accessor([0, 1, 2], "B")
+    file.primitive["material"] = file.add("materials", {"pbrMetallicRoughness": {}})
+    offsets = {"componentType": 5126, "count": 3, "type": "VEC3"}
+    indices = {"bufferView": file.view(b"\1"), "componentType": 5121}
+    values = {"bufferView": file.view(bytes(12))}
+    offsets["sparse"] = {"count": 1, "indices": indices, "values": values}
+    file.primitive["targets"] = [{"POSITION": file.add("accessors", offsets)}]
+    file.root["meshes"][0].update(weights=[0.5], extras={"targetNames": ["up"]})
+    matrices = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]] * 2
+    file.root["skins"][0].update(inverseBindMatrices=file.accessor(matrices), skeleton=1)
+    file.root["nodes"][1].update(rotation=[0, 0, 0.6, 0.8], scale=[1, -2, 1], name="hip")
+    file.root["nodes"][2].update(matrix=[1, 0.5, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+    file.add("nodes", {"camera": 0, "weights": [0.25], "mesh": 0})
+    file.add("cameras", {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}})
+    file.add("scenes", {"nodes": [0, 1, 3]})
+    file.root["scene"] = 0
+    for number, (node, path, width) in enumerate(((1, "rotation", 4), (0, "weights", 1))):
+        keys = file.accessor([[0.5] * width] * 6)
+        sampler = {"input": file.times([0.0, 1.0]), "output": keys, "interpolation": "CUBICSPLINE"}
+        channel = {"sampler": 0, "target": {"node": node, "path": path}}
+        file.add("animations", {"name": str(number), "channels": [channel], "samplers": [sampler]})
+    return file
+
+
+def changed(seed: int, count: int) -> Iterator[bytes]:
+    """Yield documents in which one to three JSON values are changed or missing."""
+    rng = random.Random(seed)
+    whole = json.loads(complete().json())
+    for _ in range(count):
+        root = copy.deepcopy(whole)
+        for _ in range(rng.randint(1, 3)):
+            _change(root, rng)
+        yield json.dumps(root).encode()
+
+
+def _change(root: dict[str, Any], rng: random.Random) -> None:
+    """Replace or remove a random value inside the root object."""
+    value: Any = root
+    while True:
+        keys = list(value) if isinstance(value, dict) else list(range(len(value)))
+        key = rng.choice(keys)
+        inner = value[key]
+        if isinstance(inner, dict | list) and inner and rng.random() < 0.85:
+            value = inner
+            continue
+        if rng.random() < 0.1:
+            del value[key]
+        else:
+            value[key] = copy.deepcopy(rng.choice(VALUES))
+        return
+
+
+def truncated() -> Iterator[bytes]:
+    """Yield truncated copies of a binary and of a text file."""
+    for data in (complete().glb(), complete().json()):
+        yield from (data[:size] for size in range(1, len(data), 97))
 
 
 def refusals(files: Iterable[bytes]) -> list[str]:

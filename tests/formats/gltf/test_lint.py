@@ -1,17 +1,272 @@
 """Findings of lint in glTF files, with every code of the reader at its JSON pointer."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from formats.gltf.files import File, animated, skinned
 from formats.gltf.planted_gltf import PLANTED
-from formats.gltf.validator_faults import FAULTS
 
 from viewer.lint import lint_files, recheck
 from viewer.loading import MotionSettings, load
 from viewer.rig import skeleton
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.skeleton import Skeleton
+
+Change = Callable[[File], object]
+
+
+def _skin(change: Change) -> File:
+    file = skinned()
+    change(file)
+    return file
+
+
+def _moved(change: Change, path: str = "translation", **sampler: object) -> File:
+    values = [[0, 0, 0, 1]] * 2 if path == "rotation" else [[0, 0, 0], [1, 0, 0]]
+    file = animated(path, values, **sampler)
+    file.mesh()
+    file.root["nodes"] = [{"mesh": 0}]
+    change(file)
+    return file
+
+
+def _sampler(file: File) -> dict:
+    return file.root["animations"][0]["samplers"][0]
+
+
+def _weights(rows: list[list[float]], joints: list[list[int]] | None = None) -> Change:
+    def change(file: File) -> None:
+        file.primitive["attributes"]["WEIGHTS_0"] = file.accessor(rows)
+        if joints is not None:
+            file.primitive["attributes"]["JOINTS_0"] = file.accessor(joints, "B")
+
+    return change
+
+
+def _apart(file: File) -> None:
+    file.root["nodes"] = [{"mesh": 0, "skin": 0}, {}, {}]
+
+
+def _node(index: int, **members: object) -> Change:
+    return lambda file: file.root["nodes"][index].update(members)
+
+
+def _in_skin(**members: object) -> Change:
+    return lambda file: file.root["skins"][0].update(members)
+
+
+def _binds(count: int, row: list[float] | None = None) -> Change:
+    identity = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+
+    def change(file: File) -> None:
+        matrices = [row or identity, *[identity] * (count - 1)]
+        file.root["skins"][0]["inverseBindMatrices"] = file.accessor(matrices)
+
+    return change
+
+
+def _attribute(name: str, rows: list, kind: str = "f") -> Change:
+    def change(file: File) -> None:
+        file.primitive["attributes"][name] = file.accessor(rows, kind)
+
+    return change
+
+
+def _accessor(**members: object) -> Change:
+    return lambda file: file.root["accessors"][2].update(members)
+
+
+def _times(values: list[float], **bounds: object) -> Change:
+    def change(file: File) -> None:
+        low, high = {"min": [min(values)]}, {"max": [max(values)]}
+        _sampler(file)["input"] = file.accessor(values, **{**low, **high, **bounds})
+
+    return change
+
+
+def _keys(values: list) -> Change:
+    return lambda file: _sampler(file).update(output=file.accessor(values))
+
+
+def _target(**members: object) -> Change:
+    return lambda file: file.root["animations"][0]["channels"][0]["target"].update(members)
+
+
+def _second_channel(file: File) -> None:
+    channels = file.root["animations"][0]["channels"]
+    channels.append(channels[0])
+
+
+def _unbounded(file: File) -> None:
+    accessor = file.root["accessors"][_sampler(file)["input"]]
+    del accessor["min"], accessor["max"]
+
+
+def _view(**members: object) -> Change:
+    return lambda file: file.root["bufferViews"][2].update(members)
+
+
+def _morphed(file: File) -> None:
+    file.primitive["targets"] = [{"NORMAL": 2}]
+
+
+def _other_scene(file: File) -> None:
+    file.root["nodes"].append({"name": "elsewhere"})
+    file.root["scenes"] = [{"nodes": [0, 3]}, {"nodes": [1]}]
+
+
+def _moved_skin(file: File) -> None:
+    times, values = file.times([0.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0]])
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    file.add(
+        "animations", {"channels": [channel], "samplers": [{"input": times, "output": values}]}
+    )
+
+
+_PRIMITIVE = "/meshes/0/primitives/0"
+_WEIGHTS = f"{_PRIMITIVE}/attributes/WEIGHTS_0"
+_JOINTS = f"{_PRIMITIVE}/attributes/JOINTS_0"
+_SAMPLER = "/animations/0/samplers/0"
+_NAN = float("nan")
+FAULTS: dict[str, tuple[Callable[[], File], str, str]] = {
+    # Skins
+    "ACCESSOR_WEIGHTS_NON_NORMALIZED": (
+        lambda: _skin(_weights([[0.5, 0.75, 0, 0]] * 3)), "W001", _WEIGHTS),
+    "ACCESSOR_WEIGHTS_NEGATIVE": (
+        lambda: _skin(_weights([[-0.25, 1.25, 0, 0]] * 3)), "W002", _WEIGHTS),
+    "ACCESSOR_JOINTS_INDEX_OOB": (
+        lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[0, 9, 0, 0]] * 3)), "W010", _JOINTS),
+    "ACCESSOR_JOINTS_INDEX_DUPLICATE": (
+        lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[1, 1, 0, 0]] * 3)), "W009", _WEIGHTS),
+    "ACCESSOR_JOINTS_USED_ZERO_WEIGHT": (
+        lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[0, 1, 1, 0]] * 3)), "G002", _JOINTS),
+    "SKIN_NO_COMMON_ROOT": (lambda: _skin(_apart), "G004", "/skins/0/joints"),
+    "SKIN_SKELETON_INVALID": (
+        lambda: _skin(_in_skin(skeleton=2)), "G004", "/skins/0/skeleton"),
+    "INVALID_IBM_ACCESSOR_COUNT": (
+        lambda: _skin(_binds(1)), "F002", "/skins/0/inverseBindMatrices"),
+    "ACCESSOR_INVALID_IBM": (
+        lambda: _skin(_binds(2, [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])),
+        "F002", "/skins/0/inverseBindMatrices"),
+    "SKIN_IBM_INVALID_FORMAT": (
+        lambda: _skin(_in_skin(inverseBindMatrices=0)), "F002", "/skins/0/inverseBindMatrices"),
+    "NODE_SKINNED_MESH_WITHOUT_SKIN": (
+        lambda: _skin(lambda file: file.root["nodes"][0].pop("skin")), "G003", "/nodes/0"),
+    "NODE_SKINNED_MESH_LOCAL_TRANSFORMS": (
+        lambda: _skin(_node(0, translation=[1, 0, 0])), "G003", "/nodes/0"),
+    "MESH_PRIMITIVE_JOINTS_WEIGHTS_MISMATCH": (
+        lambda: _skin(_attribute("JOINTS_1", [[0, 0, 0, 0]] * 3, "B")),
+        "G004", f"{_PRIMITIVE}/attributes"),
+    "NODE_SKIN_WITH_NON_SKINNED_MESH": (
+        lambda: _skin(lambda file: file.primitive.update(attributes={"POSITION": 2})),
+        "G003", "/nodes/0/skin"),
+    # Hierarchy
+    "NODE_LOOP": (lambda: _skin(_node(2, children=[1])), "F002", "/nodes/2/children"),
+    "NODE_PARENT_OVERRIDE": (lambda: _skin(_node(0, children=[2])), "F002", "/nodes/1/children/0"),
+    "NODE_MATRIX_TRS": (
+        lambda: _skin(_node(1, matrix=[*[1, 0, 0, 0, 0] * 3, 1], scale=[1, 1, 2])),
+        "G003", "/nodes/1/matrix"),
+    "ROTATION_NON_UNIT": (
+        lambda: _skin(_node(1, rotation=[0, 0, 1, 1])), "G003", "/nodes/1/rotation"),
+    "UNRESOLVED_REFERENCE": (
+        lambda: _skin(_in_skin(joints=[1, 9])), "F002", "/skins/0/joints/1"),
+    # Accessors
+    "ACCESSOR_MIN_MISMATCH": (lambda: _skin(_accessor(min=[-1, 0, 0])), "G002", "/accessors/2/min"),
+    "ACCESSOR_MAX_MISMATCH": (lambda: _skin(_accessor(max=[1, 2, 0])), "G002", "/accessors/2/max"),
+    "MESH_PRIMITIVE_POSITION_ACCESSOR_WITHOUT_BOUNDS": (
+        lambda: _skin(lambda file: file.root["accessors"][2].pop("min")),
+        "G002", f"{_PRIMITIVE}/attributes/POSITION"),
+    "ACCESSOR_TOO_LONG": (lambda: _skin(_accessor(byteOffset=8)), "F002", "/accessors/2"),
+    "ACCESSOR_INVALID_FLOAT": (
+        lambda: _skin(_attribute("NORMAL", [[0, 0, 1], [0, 0, 1], [0, 0, _NAN]])),
+        "G002", f"{_PRIMITIVE}/attributes/NORMAL"),
+    "ACCESSOR_VECTOR3_NON_UNIT": (
+        lambda: _skin(_attribute("NORMAL", [[0, 0, 2]] * 3)),
+        "M008", f"{_PRIMITIVE}/attributes/NORMAL"),
+    "MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT": (
+        lambda: _skin(_attribute("NORMAL", [[0, 0, 1]] * 2)),
+        "F002", f"{_PRIMITIVE}/attributes/NORMAL"),
+    "ACCESSOR_INDEX_OOB": (
+        lambda: _skin(lambda file: file.primitive.update(indices=file.accessor([0, 1, 7], "H"))),
+        "F002", f"{_PRIMITIVE}/indices"),
+    # Animations
+    "ACCESSOR_ANIMATION_INPUT_NON_INCREASING": (
+        lambda: _moved(_times([1.0, 0.0])), "F002", f"{_SAMPLER}/input"),
+    "ACCESSOR_ANIMATION_INPUT_NEGATIVE": (
+        lambda: _moved(_times([-1.0, 0.0])), "G005", f"{_SAMPLER}/input"),
+    "ANIMATION_SAMPLER_INPUT_ACCESSOR_WITHOUT_BOUNDS": (
+        lambda: _moved(_unbounded), "G005", f"{_SAMPLER}/input"),
+    "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_COUNT": (
+        lambda: _moved(_keys([[0, 0, 0]])), "F002", f"{_SAMPLER}/output"),
+    "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_FORMAT": (
+        lambda: _moved(_keys([0, 1])), "F002", f"{_SAMPLER}/output"),
+    "ACCESSOR_ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION": (
+        lambda: _moved(_keys([[0, 0, 0, 1], [0, 0, 1, 1]]), "rotation"),
+        "G005", f"{_SAMPLER}/output"),
+    "ANIMATION_DUPLICATE_TARGETS": (
+        lambda: _moved(_second_channel), "G005", "/animations/0/channels/1/target"),
+    "ANIMATION_CHANNEL_TARGET_NODE_MATRIX": (
+        lambda: _moved(_node(0, matrix=[*[1, 0, 0, 0, 0] * 3, 1])),
+        "G005", "/animations/0/channels/0/target/node"),
+    "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS": (
+        lambda: _moved(_target(path="weights")), "F007", "/animations/0/channels/0"),
+    # Dependencies
+    "EMPTY_ENTITY": (lambda: _skin(_node(2, children=[])), "G003", "/nodes/2/children"),
+    "UNSATISFIED_DEPENDENCY": (lambda: _skin(_node(1, skin=0)), "G003", "/nodes/1/skin"),
+    "NODE_MATRIX_NON_TRS": (
+        lambda: _skin(_node(2, matrix=[1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])),
+        "G003", "/nodes/2/matrix"),
+    "DUPLICATE_ELEMENTS": (
+        lambda: _skin(lambda file: file.root.update(scenes=[{"nodes": [0, 1, 0]}])),
+        "G003", "/scenes/0/nodes/2"),
+    "NODE_SKINNED_MESH_NON_ROOT": (
+        lambda: _skin(lambda file: file.add("nodes", {"children": [0]})), "G007", "/nodes/0"),
+    "NODE_SKIN_NO_SCENE": (lambda: _skin(_other_scene), "G004", "/nodes/0"),
+    "ANIMATION_CHANNEL_TARGET_NODE_SKIN": (
+        lambda: _skin(_moved_skin), "G007", "/animations/0/channels/0/target/path"),
+    "UNDECLARED_EXTENSION": (
+        lambda: _skin(_node(1, extensions={"ACME_tag": {}})),
+        "G001", "/nodes/1/extensions/ACME_tag"),
+    "UNUSED_EXTENSION_REQUIRED": (
+        lambda: _skin(lambda file: file.root.update(extensionsRequired=["KHR_mesh_quantization"])),
+        "G001", "/extensionsRequired/0"),
+    # Storage
+    "ACCESSOR_NORMALIZED_INVALID": (
+        lambda: _skin(_accessor(normalized=True)), "G002", "/accessors/2/normalized"),
+    "ARRAY_TYPE_MISMATCH": (
+        lambda: _skin(_accessor(max=["a", 1, 0])), "G002", "/accessors/2/max"),
+    "VALUE_NOT_IN_LIST": (lambda: _skin(_view(target=5)), "G002", "/bufferViews/2/target"),
+    "VALUE_NOT_IN_RANGE": (
+        lambda: _skin(_view(byteStride=300)), "G002", "/bufferViews/2/byteStride"),
+    "BUFFER_VIEW_TOO_LONG": (
+        lambda: _skin(lambda file: file.view(bytes(4), byteLength=5000)),
+        "G002", "/bufferViews/3/byteLength"),
+    "BUFFER_VIEW_TARGET_OVERRIDE": (
+        lambda: _skin(_view(target=34963)), "G002", f"{_PRIMITIVE}/attributes/POSITION"),
+    "MESH_PRIMITIVE_INVALID_ATTRIBUTE": (
+        lambda: _skin(_attribute("SPEED", [[0, 0, 1]] * 3)),
+        "G002", f"{_PRIMITIVE}/attributes/SPEED"),
+    "MESH_PRIMITIVE_INDEXED_SEMANTIC_CONTINUITY": (
+        lambda: _skin(_attribute("TEXCOORD_1", [[0, 0]] * 3)), "G002", f"{_PRIMITIVE}/attributes"),
+    "MESH_PRIMITIVE_ATTRIBUTES_ACCESSOR_INVALID_FORMAT": (
+        lambda: _skin(_attribute("NORMAL", [[0, 0, 1]] * 3, "b")),
+        "G002", f"{_PRIMITIVE}/attributes/NORMAL"),
+    "MESH_PRIMITIVE_INDICES_ACCESSOR_INVALID_FORMAT": (
+        lambda: _skin(lambda file: file.primitive.update(indices=file.accessor([0, 1, 2], "h"))),
+        "G002", f"{_PRIMITIVE}/indices"),
+    "MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR": (
+        lambda: _skin(_morphed), "G002", f"{_PRIMITIVE}/targets/0/NORMAL"),
+    "ACCESSOR_INVALID_SIGN": (
+        lambda: _skin(_attribute("TANGENT", [[1, 0, 0, 0.5]] * 3)),
+        "G002", f"{_PRIMITIVE}/attributes/TANGENT"),
+    "MESH_PRIMITIVE_TOO_FEW_TEXCOORDS": (
+        lambda: _skin(lambda file: (
+            file.add("materials", {"normalTexture": {"index": 0}}),
+            file.primitive.update(material=0))),
+        "G002", _PRIMITIVE),
+}  # fmt: skip
+"""A function that creates the file, the code that lint reports, and the JSON pointer."""
 
 
 @pytest.mark.parametrize("code", PLANTED)

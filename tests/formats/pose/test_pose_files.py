@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from faults import INF, NAN, fault_of, told, warnings_of
 from formats.pig_text import write as write_pig
-from formats.pose.pose_texts import read
 from formats.skel_text import GOOD as SKEL
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
@@ -19,6 +18,12 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.hands import hand_vectors
 from viewer.rig.pose import joint_rotations, rest_pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
+
+
+def read(path):
+    source = Source.open(path)
+    return pose.read(source), warnings_of(source.diagnostics)
+
 
 MODELS = {kind: model(kind, 32) for kind in ("smpl", "smplx", "flame", "mano")}
 

@@ -1,14 +1,16 @@
 """Triangle order for the vertex cache: consecutive neighbours, all triangles, unchanged runs."""
 
+import ctypes
+import ctypes.util
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from rendering.drawn_figures import arm, checker, sphere
 from rendering.front_view import alone, drawn, front_view, grid_figure
-from rendering.gpu.gl_objects import gl_objects
 from rendering.plain_pictures import draw, front, plain
 
 from viewer.errors import RenderError
@@ -20,6 +22,21 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import Skinning
+
+_KINDS = ("Buffer", "Texture", "VertexArray", "Framebuffer", "Renderbuffer", "Query")
+_PROGRAMS = ("Program", "Shader")
+_LARGEST = 1024  # names are assigned from 1, the smallest free one first
+
+
+def gl_objects() -> Counter[str]:
+    """Return the number of objects of each kind in the current context."""
+    library = ctypes.CDLL(ctypes.util.find_library("GL") or "libGL.so.1")
+    found: Counter[str] = Counter()
+    for kind in (*_KINDS, *_PROGRAMS):
+        is_one = getattr(library, f"glIs{kind}")
+        is_one.restype = ctypes.c_ubyte
+        found[kind] = sum(bool(is_one(name)) for name in range(1, _LARGEST))
+    return found
 
 
 def shaded(triangles, kept=32) -> int:
