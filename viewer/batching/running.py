@@ -155,7 +155,9 @@ def _earlier(settings: Settings) -> dict[str, Result]:
         return {}
     found = [one for path in _related_reports(settings.report) for one in read_results(path)]
     # A later result of another shard or with other options has replaced the same output.
-    last = {one.item.output or one.item.name: one for one in sorted(found, key=_time)}
+    last = {
+        one.item.output or one.item.name: one for one in sorted(found, key=lambda one: one.time)
+    }
     return {
         one.key: one
         for one in last.values()
@@ -169,10 +171,6 @@ def _related_reports(path: Path) -> list[Path]:
     names = f"{stem}.*-of-*.jsonl"
     shards = sorted(path.parent.glob(names)) if path.parent.is_dir() else []
     return [one for one in dict.fromkeys([path, *shards]) if one.is_file()]
-
-
-def _time(result: Result) -> float:
-    return result.time
 
 
 def _has_content(path: Path) -> bool:

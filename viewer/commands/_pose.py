@@ -119,7 +119,14 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
         notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
     notes += apply_dofs(scene, pose.dof)
     if pose.mirror:
-        _mirror(scene)
+        from viewer.rig.retargeting.mirror import mirror_pose
+
+        for actor in scene.actors:
+            if actor.pose is not None:
+                try:
+                    actor.pose = mirror_pose(actor.figure, actor.pose)
+                except RigError as problem:
+                    raise ViewerError(f"--mirror: {problem}") from None
     return notes
 
 
@@ -182,7 +189,7 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
     """Set shape weights by name or in order; figures without shapes may have morphs."""
     from viewer.rig.posing.pose_record import PoseRecord, apply_record
 
-    if is_named(text):
+    if "=" in text:  # weights given by name, such as ``open=0.5,wide=1``
         actor, record = _named_record(scene, text)
         return apply_record(record, actor.figure, actor.require_pose())
     values = _numbers("--shape", text)
@@ -200,17 +207,6 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
         rows = range(min(len(values), figure.n_shapes))
         values[: len(rows)] -= [figure.blend_shapes.origin(row) for row in rows]
     return _apply_record("--shape", PoseRecord(shape=values), scene)
-
-
-def _mirror(scene: Scene) -> None:
-    from viewer.rig.retargeting.mirror import mirror_pose
-
-    for actor in scene.actors:
-        if actor.pose is not None:
-            try:
-                actor.pose = mirror_pose(actor.figure, actor.pose)
-            except RigError as problem:
-                raise ViewerError(f"--mirror: {problem}") from None
 
 
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
@@ -296,11 +292,6 @@ def _dof_value(asked: str, text: str, is_rotation: bool) -> float:
     except (ValueError, argparse.ArgumentTypeError):
         raise ViewerError(f'--dof: expected a number after "=", found "{asked}"') from None
     return math.radians(value) if found[2] == "deg" and is_rotation else value
-
-
-def is_named(text: str) -> bool:
-    """Return whether weights are given by name, such as ``open=0.5,wide=1``."""
-    return "=" in text
 
 
 def _has_only_morphs(figure: Figure) -> bool:

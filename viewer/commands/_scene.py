@@ -168,12 +168,17 @@ def scene_options(arguments: argparse.Namespace) -> SceneOptions:
         raise ViewerError("--video and --images: expected one of them, found both")
     options = settings_of(SceneOptions, arguments, files=arguments.files)
     use_models(options.model_path)
+    joint_map: JointMap | None = None
+    if options.joint_map is not None:
+        from viewer.formats._joint_map import read_joint_map
+
+        joint_map = read_joint_map(Source.open(options.joint_map, options.size_limit))
     options.motion = settings_of(
         MotionSettings,
         arguments,
         frame_rate=arguments.fps,
         is_overlay=getattr(arguments, "overlay", None) is not None,
-        joint_map=_joint_map(options),
+        joint_map=joint_map,
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
         motions=tuple(resolve(file) for file in options.motion_files),
     )
@@ -181,15 +186,6 @@ def scene_options(arguments: argparse.Namespace) -> SceneOptions:
     options.pose = settings_of(PoseOptions, arguments)
     options.output = getattr(arguments, "output", None)
     return options
-
-
-def _joint_map(options: SceneOptions) -> JointMap | None:
-    """Return the requested match of joints; raises FormatError if its file cannot be read."""
-    if options.joint_map is None:
-        return None
-    from viewer.formats._joint_map import read_joint_map
-
-    return read_joint_map(Source.open(options.joint_map, options.size_limit))
 
 
 def parse_bytes(text: str, option: str = "--max-size") -> int:

@@ -112,21 +112,14 @@ def _describe_actor(actor: Actor, up: str) -> JsonObject:
 
         if MORPH_GROUP in figure.blend_shapes.groups:
             parts["morphs"] = _describe_morphs(figure.blend_shapes)
-    return parts | _describe_motions(actor)
+    if actor.clip is not None or figure.animations:
+        from viewer.commands._info_clips import describe_animations, describe_clip
 
-
-def _describe_motions(actor: Actor) -> JsonObject:
-    if actor.clip is None and not actor.figure.animations:
-        return {}
-    from viewer.commands._info_clips import describe_animations, describe_clip
-
-    parts: JsonObject = {}
-    if actor.clip is not None:
-        parts["clip"] = describe_clip(actor.clip)
-        space = actor.shape_space
-        parts["clip"] |= {"model": space.model or None, "gender": space.gender or None}
-    if actor.figure.animations:
-        parts["animations"] = describe_animations(actor)
+        if actor.clip is not None:
+            parts["clip"], space = describe_clip(actor.clip), actor.shape_space
+            parts["clip"] |= {"model": space.model or None, "gender": space.gender or None}
+        if figure.animations:
+            parts["animations"] = describe_animations(actor)
     return parts
 
 
@@ -169,6 +162,8 @@ def _finite(value: float) -> float | None:
 
 def _describe_mesh(mesh: Mesh) -> JsonObject:
     lengths = np.linalg.norm(mesh.normals, axis=1)
+    # Triangles without a part are counted first.
+    counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
     return {
         "vertices": mesh.n_vertices,
         "triangles": mesh.n_triangles,
@@ -177,7 +172,10 @@ def _describe_mesh(mesh: Mesh) -> JsonObject:
         "normal_lengths": [float(lengths.min()), float(lengths.max())],
         "has_uvs": mesh.uvs is not None,
         "has_colors": mesh.colors is not None,
-        "parts": _describe_parts(mesh),
+        "parts": [
+            {"name": name, "triangles": int(count)}
+            for name, count in zip(mesh.parts, counts, strict=True)
+        ],
         "materials": [
             {
                 "name": material.name,
@@ -188,16 +186,6 @@ def _describe_mesh(mesh: Mesh) -> JsonObject:
             for material in mesh.materials
         ],
     }
-
-
-def _describe_parts(mesh: Mesh) -> list[JsonObject]:
-    """Return the parts that can be hidden, with their numbers of triangles."""
-    # Triangles without a part are counted first.
-    counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
-    return [
-        {"name": name, "triangles": int(count)}
-        for name, count in zip(mesh.parts, counts, strict=True)
-    ]
 
 
 def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> JsonObject:
@@ -252,19 +240,11 @@ def _lines(actor: JsonObject) -> list[str]:
     if "skin" in actor:
         lines += _skin_lines(actor["skin"])
     lines += [_morph_line(morph) for morph in actor.get("morphs", [])]
-    return lines + _motion_lines(actor)
+    if "clip" in actor or "animations" in actor:
+        from viewer.commands._info_clips import animation_lines, clip_lines
 
-
-def _motion_lines(actor: JsonObject) -> list[str]:
-    lines: list[str] = []
-    if "clip" in actor:
-        from viewer.commands._info_clips import clip_lines
-
-        lines += clip_lines(actor["clip"])
-    if "animations" in actor:
-        from viewer.commands._info_clips import animation_lines
-
-        lines += animation_lines(actor["animations"])
+        lines += clip_lines(actor["clip"]) if "clip" in actor else []
+        lines += animation_lines(actor["animations"]) if "animations" in actor else []
     return lines
 
 

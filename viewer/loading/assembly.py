@@ -270,7 +270,11 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
     # Figures of files without it keep their rest pose.
     from viewer.rig.motion.animation_choice import NONE, chosen_animation
 
-    files = _files(draft)
+    by_file: dict[object, list[Actor]] = {}
+    for actor in draft.actors:
+        if actor.figure.animations and actor.clip is None:
+            by_file.setdefault(actor.file or actor, []).append(actor)
+    files = [*by_file.values()]
     if not files and wanted.lower() == NONE:
         return
     if wanted and not files:
@@ -288,15 +292,6 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
             _start(draft, actors, chosen, is_requested=bool(wanted))
     if files and len(refusals) == len(files):
         raise refusals[0]
-
-
-def _files(draft: SceneDraft) -> list[list[Actor]]:
-    """Return the actors that can be animated, grouped by file."""
-    files: dict[object, list[Actor]] = {}
-    for actor in draft.actors:
-        if actor.figure.animations and actor.clip is None:
-            files.setdefault(actor.file or actor, []).append(actor)
-    return [*files.values()]
 
 
 def _start(

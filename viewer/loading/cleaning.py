@@ -103,11 +103,26 @@ def _cleaned(
         clip, said = _grounded(scene, actor, clip)
         notes.append(said)
     if wanted.frames is not None:
-        clip, said = _trimmed(actor, clip, wanted.frames)
-        notes.append(said)
+        found = trimmed(clip, *wanted.frames)
+        number, count = found.timing.first_frame, found.timing.n_frames
+        key = "X006.trimmed: {figure}: frames {first} to {last} kept, {n} of {all}"
+        kept = {"first": number, "last": number + count - 1, "n": count}
+        notes.append(note(key, figure=actor.name, **kept, all=clip.timing.n_frames))
+        clip = found
     if wanted.rate is not None and wanted.rate != clip.timing.frame_rate:
-        clip, said = _resampled(actor, clip, wanted.rate)
-        notes.append(said)
+        found = resampled(clip, wanted.rate)
+        rates = {
+            "old": clip.timing.frame_rate,
+            "new": wanted.rate,
+            "before": counted(clip.timing.n_frames, "frame"),
+            "after": found.timing.n_frames,
+        }
+        key = (
+            "X006.resampled: {figure}: resampled from {old:g} to {new:g} fps, {before} to {after}: "
+            "at the times of the original frames, "
+        )
+        notes.append(_note(key, actor, rates, clip, found))
+        clip = found
     return clip, notes
 
 
@@ -190,32 +205,6 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
         "its feet is at height 0 (they never clearly rest)"
     )
     return replace(clip, figure_translations=places), Diagnostic(key, values=values)
-
-
-def _resampled(actor: Actor, clip: Captured, rate: float) -> tuple[Captured, Diagnostic]:
-    found = resampled(clip, rate)
-    values = {
-        "old": clip.timing.frame_rate,
-        "new": rate,
-        "before": counted(clip.timing.n_frames, "frame"),
-        "after": found.timing.n_frames,
-    }
-    message = (
-        "X006.resampled: {figure}: resampled from {old:g} to {new:g} fps, {before} to {after}: at "
-        "the times of the original frames, "
-    )
-    return found, _note(message, actor, values, clip, found)
-
-
-def _trimmed(
-    actor: Actor, clip: Captured, frames: tuple[int | None, int | None]
-) -> tuple[Captured, Diagnostic]:
-    timing = clip.timing
-    found = trimmed(clip, *frames)
-    number, count = found.timing.first_frame, found.timing.n_frames
-    key = "X006.trimmed: {figure}: frames {first} to {last} kept, {n} of {all}"
-    values = {"first": number, "last": number + count - 1, "n": count, "all": timing.n_frames}
-    return found, note(key, figure=actor.name, **values)
 
 
 def _interpolated(
