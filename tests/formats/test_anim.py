@@ -252,12 +252,7 @@ def test_channel_without_keys_is_reported_as_a_warning():
             (
                 "F002.anim-keys",
                 1,
-                {
-                    "where": "channel 0",
-                    "found": 2,
-                    "begins": None,
-                    "expected": 3,
-                },
+                {"where": "channel 0", "found": 2, "begins": None, "expected": 3},
             ),
         ),
         (
@@ -311,19 +306,11 @@ def test_channel_without_keys_is_reported_as_a_warning():
         ),
         (
             GOOD.replace("} }", "} keys 0 { } }", 1),
-            (
-                "F002.anim-keys-again",
-                1,
-                {"where": "channel 0", "found": b"keys", "begins": None},
-            ),
+            ("F002.anim-keys-again", 1, {"where": "channel 0", "found": b"keys", "begins": None}),
         ),
         (
             GOOD.replace("numchannels 1 channel", "numchannels 1 chanel"),
-            (
-                "F002.anim-item",
-                1,
-                {"where": "animation", "found": b"chanel", "begins": None},
-            ),
+            ("F002.anim-item", 1, {"where": "animation", "found": b"chanel", "begins": None}),
         ),
         (
             GOOD.replace("numchannels 1", "numchannels -1"),
@@ -358,12 +345,7 @@ def test_channel_without_keys_is_reported_as_a_warning():
             (
                 "F002.number",
                 1,
-                {
-                    "where": "animation",
-                    "found": b"up",
-                    "begins": None,
-                    "item": "animation: range",
-                },
+                {"where": "animation", "found": b"up", "begins": None, "item": "animation: range"},
             ),
         ),
         ("", ("F002.kind", None, {"wanted": ".anim", "looks": "an empty file"})),
@@ -372,11 +354,7 @@ def test_channel_without_keys_is_reported_as_a_warning():
             (
                 "F002.anim-channel-item",
                 1,
-                {
-                    "where": "channel 0",
-                    "found": b"extrapolates",
-                    "begins": None,
-                },
+                {"where": "channel 0", "found": b"extrapolates", "begins": None},
             ),
         ),
         (

@@ -70,19 +70,11 @@ def test_empty_target_is_reported_as_a_warning():
         ("", ("F002.kind", None, {"wanted": ".morph", "looks": "an empty file"})),
         (
             GOOD.replace("-1", "up"),
-            (
-                "F002.number",
-                3,
-                {"item": "positions, entry 1", "found": b"up"},
-            ),
+            ("F002.number", 3, {"item": "positions, entry 1", "found": b"up"}),
         ),
         (
             GOOD.replace("-1", "nan"),
-            (
-                "F003.number",
-                3,
-                {"item": "positions, entry 1", "found": b"nan"},
-            ),
+            ("F003.number", 3, {"item": "positions, entry 1", "found": b"nan"}),
         ),
         (
             GOOD.replace("7 .5", "7.5 .5"),
@@ -118,16 +110,9 @@ def test_empty_target_is_reported_as_a_warning():
         ),
         (
             GOOD.replace("  3 0 1 2\n", "  3 0 1\n"),
-            (
-                "F002.width",
-                2,
-                {"item": "positions, entry 0", "expected": 4, "found": 3},
-            ),
+            ("F002.width", 2, {"item": "positions, entry 0", "expected": 4, "found": 3}),
         ),
-        (
-            GOOD + "triangles 1 { 0 1 2 }",
-            ("F002.morph-section", 9, {"found": b"triangles"}),
-        ),
+        (GOOD + "triangles 1 { 0 1 2 }", ("F002.morph-section", 9, {"found": b"triangles"})),
         (GOOD + POSITIONS, ("F002.morph-repeated", 9, {"section": "positions"})),
         (
             GOOD.replace("normals 2 {", "normals 2"),

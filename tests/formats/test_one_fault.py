@@ -281,7 +281,7 @@ FAULTS: dict[str, list[tuple[str, str, str, int | None, dict[str, Any], str, lis
             {"item": "OFFSET of joint LeftUpLeg", "found": b"nan"},
             "joints",
             [1],
-        ),
+        )
     ],
     "a.anim": [
         (

@@ -267,11 +267,7 @@ def test_matrix_may_be_dense():
     assert line == (
         "F002.value",
         None,
-        {
-            "item": "v",
-            "expected": "3 x 3 numbers",
-            "found": "2 x 3 float64",
-        },
+        {"item": "v", "expected": "3 x 3 numbers", "found": "2 x 3 float64"},
     )
 
 

@@ -31,100 +31,45 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
         ("HIERARCHY", ("F002.bvh-no-root", 1, {"found": None})),
         ("HIERARCHY MOTION", ("F002.bvh-no-root", 1, {"found": b"MOTION"})),
         ("HIERARCHY\nJOINT a {", ("F002.bvh-root", 2, {"found": b"JOINT"})),
-        (
-            "HIERARCHY\nROOT a\n",
-            ("F002.opening", 2, {"item": "joint a", "found": None}),
-        ),
+        ("HIERARCHY\nROOT a\n", ("F002.opening", 2, {"item": "joint a", "found": None})),
         (
             GOOD.replace("LeftUpLeg\n\t{", "LeftUpLeg\n\t"),
             ("F002.opening", 8, {"item": "joint LeftUpLeg", "found": b"OFFSET"}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 up 0.0"),
-            (
-                "F002.number",
-                8,
-                {
-                    "item": "OFFSET of joint LeftUpLeg",
-                    "found": b"up",
-                },
-            ),
+            ("F002.number", 8, {"item": "OFFSET of joint LeftUpLeg", "found": b"up"}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 nan 0.0"),
-            (
-                "F003.number",
-                8,
-                {
-                    "item": "OFFSET of joint LeftUpLeg",
-                    "found": b"nan",
-                },
-            ),
+            ("F003.number", 8, {"item": "OFFSET of joint LeftUpLeg", "found": b"nan"}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0,1 0 0"),
-            (
-                "F002.number",
-                8,
-                {
-                    "item": "OFFSET of joint LeftUpLeg",
-                    "found": b"0,1",
-                },
-            ),
+            ("F002.number", 8, {"item": "OFFSET of joint LeftUpLeg", "found": b"0,1"}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0"),
-            (
-                "F002.width",
-                8,
-                {
-                    "item": "OFFSET of joint LeftUpLeg",
-                    "expected": 3,
-                    "found": 2,
-                },
-            ),
+            ("F002.width", 8, {"item": "OFFSET of joint LeftUpLeg", "expected": 3, "found": 2}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0 0.0 5"),
-            (
-                "F002.more",
-                8,
-                {
-                    "item": "OFFSET of joint LeftUpLeg",
-                    "expected": 3,
-                    "found": b"5",
-                },
-            ),
+            ("F002.more", 8, {"item": "OFFSET of joint LeftUpLeg", "expected": 3, "found": b"5"}),
         ),
         (
             GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 1 2 3\nOFFSET 4 5 6"),
-            (
-                "F002.bvh-offset-again",
-                9,
-                {"found": b"OFFSET", "joint": "joint LeftUpLeg"},
-            ),
+            ("F002.bvh-offset-again", 9, {"found": b"OFFSET", "joint": "joint LeftUpLeg"}),
         ),
         (
             GOOD.replace("OFFSET 0.0 0.2 0.0", "OFFSET 0.0 1e999 0.0"),
-            (
-                "F003.too-large",
-                26,
-                {
-                    "item": "OFFSET of End Site of joint Head",
-                    "found": b"1e999",
-                },
-            ),
+            ("F003.too-large", 26, {"item": "OFFSET of End Site of joint Head", "found": b"1e999"}),
         ),
         (
             GOOD.replace("CHANNELS 6", "CHANNELS 5"),
             (
                 "F002.bvh-channel-count",
                 5,
-                {
-                    "item": "CHANNELS of joint Hips",
-                    "expected": 5,
-                    "found": 6,
-                },
+                {"item": "CHANNELS of joint Hips", "expected": 5, "found": 6},
             ),
         ),
         (
@@ -132,64 +77,32 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
             (
                 "F002.bvh-channel-count",
                 5,
-                {
-                    "item": "CHANNELS of joint Hips",
-                    "expected": 99999999999,
-                    "found": 6,
-                },
+                {"item": "CHANNELS of joint Hips", "expected": 99999999999, "found": 6},
             ),
         ),
         (
             GOOD.replace("CHANNELS 6", "CHANNELS -6"),
-            (
-                "F002.count",
-                5,
-                {
-                    "found": b"-6",
-                    "item": "CHANNELS of joint Hips",
-                },
-            ),
+            ("F002.count", 5, {"found": b"-6", "item": "CHANNELS of joint Hips"}),
         ),
         (
             GOOD.replace("CHANNELS 6", "CHANNELS 2.5"),
-            (
-                "F002.count",
-                5,
-                {
-                    "found": b"2.5",
-                    "item": "CHANNELS of joint Hips",
-                },
-            ),
+            ("F002.count", 5, {"found": b"2.5", "item": "CHANNELS of joint Hips"}),
         ),
         (
             GOOD.replace("Zposition", "Wposition"),
-            (
-                "F002.bvh-channel",
-                5,
-                {
-                    "found": b"Wposition",
-                    "item": "CHANNELS of joint Hips",
-                },
-            ),
+            ("F002.bvh-channel", 5, {"found": b"Wposition", "item": "CHANNELS of joint Hips"}),
         ),
         (
             GOOD.replace("Zposition", "xposition"),
             (
                 "F002.bvh-position-again",
                 5,
-                {
-                    "found": b"xposition",
-                    "item": "CHANNELS of joint Hips",
-                },
+                {"found": b"xposition", "item": "CHANNELS of joint Hips"},
             ),
         ),
         (
             GOOD.replace("\tCHANNELS 6", "\tCHANNELS 1 Xrotation\n\tCHANNELS 6"),
-            (
-                "F002.bvh-channels-again",
-                6,
-                {"found": b"CHANNELS", "joint": "joint Hips"},
-            ),
+            ("F002.bvh-channels-again", 6, {"found": b"CHANNELS", "joint": "joint Hips"}),
         ),
         (
             GOOD.replace("\tOFFSET 0.1", "\tCENTER 0.1"),
@@ -197,30 +110,15 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
         ),
         (
             GOOD.replace("OFFSET 0.0 0.2 0.0", "JOINT x { }"),
-            (
-                "F002.bvh-end-item",
-                26,
-                {
-                    "found": b"JOINT",
-                    "joint": "End Site of joint Head",
-                },
-            ),
+            ("F002.bvh-end-item", 26, {"found": b"JOINT", "joint": "End Site of joint Head"}),
         ),
         (
             GOOD.replace("}\nMOTION", "MOTION"),
-            (
-                "F002.joint-open",
-                29,
-                {"found": b"MOTION", "joint": "joint Hips", "line": 2},
-            ),
+            ("F002.joint-open", 29, {"found": b"MOTION", "joint": "joint Hips", "line": 2}),
         ),
         (
             GOOD.partition("\t\tJOINT LeftFoot")[0],
-            (
-                "F002.joint-open",
-                9,
-                {"found": None, "joint": "joint LeftUpLeg", "line": 6},
-            ),
+            ("F002.joint-open", 9, {"found": None, "joint": "joint LeftUpLeg", "line": 6}),
         ),
         (
             GOOD.replace("Frames: 2", "Frames: two"),
@@ -234,14 +132,8 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
             GOOD.partition(" 2\nFrame Time")[0],
             ("F002.count", 31, {"item": "Frames", "found": None}),
         ),
-        (
-            GOOD.replace("0.0333333", "nan"),
-            ("F002.bvh-seconds", 32, {"found": b"nan"}),
-        ),
-        (
-            GOOD.replace("0.0333333", "-0.1"),
-            ("F002.bvh-seconds", 32, {"found": b"-0.1"}),
-        ),
+        (GOOD.replace("0.0333333", "nan"), ("F002.bvh-seconds", 32, {"found": b"nan"})),
+        (GOOD.replace("0.0333333", "-0.1"), ("F002.bvh-seconds", 32, {"found": b"-0.1"})),
         (
             GOOD.replace("0.0 1.0 0.0 0", "0.0 1.0 0.0 0;"),
             ("F002.number", 33, {"item": "frame 0", "found": b"0;"}),
@@ -282,24 +174,12 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
         (
             GOOD.replace("Frames: 2", "Frames: 1"),
             2,
-            [
-                (
-                    "F007.bvh-frames",
-                    34,
-                    {"expected": "1 frame", "found": 2, "rest": None},
-                )
-            ],
+            [("F007.bvh-frames", 34, {"expected": "1 frame", "found": 2, "rest": None})],
         ),
         (
             GOOD.replace("Frames: 2", "Frames: 99999999999"),
             2,
-            [
-                (
-                    "F007.bvh-frames",
-                    34,
-                    {"expected": "99999999999 frames", "found": 2, "rest": None},
-                )
-            ],
+            [("F007.bvh-frames", 34, {"expected": "99999999999 frames", "found": 2, "rest": None})],
         ),
         (
             GOOD.rstrip()[:-8],
@@ -308,11 +188,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
                 (
                     "F007.bvh-frames",
                     34,
-                    {
-                        "expected": "2 frames",
-                        "found": 1,
-                        "rest": "11 of 15 numbers for the next",
-                    },
+                    {"expected": "2 frames", "found": 1, "rest": "11 of 15 numbers for the next"},
                 )
             ],
         ),
@@ -323,11 +199,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
                 (
                     "F007.bvh-frames",
                     1,
-                    {
-                        "expected": "2 frames",
-                        "found": 1,
-                        "rest": "11 of 15 numbers for the next",
-                    },
+                    {"expected": "2 frames", "found": 1, "rest": "11 of 15 numbers for the next"},
                 )
             ],
         ),
@@ -361,11 +233,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
             2,
             [("F007.bvh-no-offset", 6, {"joint": "joint LeftUpLeg"})],
         ),
-        (
-            re.sub(r"\n\t+CHANNELS.*", "", GOOD),
-            1,
-            [("F007.bvh-no-channels", 28, {})],
-        ),
+        (re.sub(r"\n\t+CHANNELS.*", "", GOOD), 1, [("F007.bvh-no-channels", 28, {})]),
     ],
 )
 def test_oddities_load_with_a_warning(text, count, warnings):

@@ -203,10 +203,7 @@ def test_value_that_is_not_a_record_is_left_out(tmp_path):
                 "problem": (
                     "F002.record",
                     None,
-                    {
-                        "item": "",
-                        "problem": "expected a person with named values, found 3",
-                    },
+                    {"item": "", "problem": "expected a person with named values, found 3"},
                 )
             },
         ),
@@ -233,10 +230,7 @@ def test_messages_identify_untracked_people(tmp_path):
                 "problem": (
                     "F003.record",
                     None,
-                    {
-                        "item": "untracked 2: Th",
-                        "problem": "expected finite numbers, found nan",
-                    },
+                    {"item": "untracked 2: Th", "problem": "expected finite numbers, found nan"},
                 )
             },
         ),

@@ -38,10 +38,7 @@ def test_invalid_numbers_are_refused_with_their_place(tmp_path, old, new, messag
 def test_products_of_valid_transforms_are_refused_when_they_are_out_of_reach(tmp_path):
     scaled = '\nP: "Lcl Scaling", "Lcl Scaling", "", "A",1e17,1e17,1e17'
     low = 'Model: 21, "Model::low", "LimbNode" { Version: 232 }'
-    edits = {
-        MOVED: MOVED + scaled,
-        low: low.replace(" }", f" Properties70:  {{ {scaled} }}\n}}"),
-    }
+    edits = {MOVED: MOVED + scaled, low: low.replace(" }", f" Properties70:  {{ {scaled} }}\n}}")}
     with pytest.raises(FormatError, match='joint "high": expected a rest transform within'):
         viewer.load(write_strip(tmp_path, edits=edits))
 

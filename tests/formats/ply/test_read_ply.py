@@ -293,11 +293,7 @@ def changed(old: str, new: str) -> str:
         ),
         (
             changed("3 0 1 2\n", "-1 0 1 2\n"),
-            (
-                "F002.ply-list",
-                14,
-                {"item": "face 0", "found": -1.0},
-            ),
+            ("F002.ply-list", 14, {"item": "face 0", "found": -1.0}),
         ),
         (
             changed("3 0 1 2\n", "3 0 1 4\n"),

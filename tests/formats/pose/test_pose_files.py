@@ -231,16 +231,7 @@ def test_unknown_keys_are_reported_except_motion_keys():
     assert warnings == []
     _, warnings = parts(body_pose=[0] * 63, body_poses=[1], comment="me")
     assert warnings == [
-        (
-            "F007.pose-keys",
-            1,
-            {
-                "keys": [
-                    "body_poses (did you mean body_pose?)",
-                    "comment",
-                ]
-            },
-        )
+        ("F007.pose-keys", 1, {"keys": ["body_poses (did you mean body_pose?)", "comment"]})
     ]
 
 

@@ -183,22 +183,14 @@ BROKEN = {
         (
             "F002.value",
             None,
-            {
-                "item": "viewer_rig",
-                "expected": "a single number",
-                "found": "a string",
-            },
+            {"item": "viewer_rig", "expected": "a single number", "found": "a string"},
         ),
     ),
     "up": ({"up": np.array("x")}, ("F002.rig-up", None, {"item": "up", "found": "x"})),
     "no positions": ({"positions": None}, ("F002.no-key", None, {"item": "positions"})),
     "nan": (
         {"positions": np.full((4, 3), np.nan)},
-        (
-            "F003.finite",
-            None,
-            {"item": "positions", "found": NAN, "at": "vertex 0"},
-        ),
+        ("F003.finite", None, {"item": "positions", "found": NAN, "at": "vertex 0"}),
     ),
     "triangles": (
         {"triangles": np.array([[0, 1, 4], [0, 1, 2]])},
@@ -206,15 +198,7 @@ BROKEN = {
     ),
     "joints": (
         {"parents": np.array([-1, 0, 0])},
-        (
-            "F002.value",
-            None,
-            {
-                "item": "parents",
-                "expected": "2 numbers",
-                "found": "3 int64",
-            },
-        ),
+        ("F002.value", None, {"item": "parents", "expected": "2 numbers", "found": "3 int64"}),
     ),
     "cycle": (
         {"parents": np.array([1, 0])},

@@ -276,10 +276,7 @@ def message(text):
         ("offset 1 2 3", ("F002.no-joint", 1, {"looks": None})),
         ("\0\0\0\0", ("F002.no-joint", None, {"looks": "zeros"})),
         ("balljoint", ("F002.opening", 1, {"item": "unnamed joint", "found": None})),
-        (
-            "\nballjoint a b\n",
-            ("F002.opening", 2, {"item": "joint a b", "found": None}),
-        ),
+        ("\nballjoint a b\n", ("F002.opening", 2, {"item": "joint a b", "found": None})),
         (
             "balljoint a\noffset 1 2 3 }",
             ("F002.opening", 2, {"item": "joint a", "found": b"offset"}),
@@ -291,161 +288,59 @@ def message(text):
         ("balljoint\n}", ("F002.opening", 2, {"item": "unnamed joint", "found": b"}"})),
         (
             "balljoint a {\n\n offset 1 up 3 }",
-            (
-                "F002.number",
-                3,
-                {
-                    "item": "offset of joint a",
-                    "found": b"up",
-                },
-            ),
+            ("F002.number", 3, {"item": "offset of joint a", "found": b"up"}),
         ),
         (
             "balljoint a {\r\n\r\n offset 1 nan 3 }",
-            (
-                "F003.number",
-                3,
-                {
-                    "item": "offset of joint a",
-                    "found": b"nan",
-                },
-            ),
+            ("F003.number", 3, {"item": "offset of joint a", "found": b"nan"}),
         ),
         (
             "balljoint a {\r\r\noffset 1\r\r\ninf 3 }",
-            (
-                "F003.number",
-                3,
-                {
-                    "item": "offset of joint a",
-                    "found": b"inf",
-                },
-            ),
+            ("F003.number", 3, {"item": "offset of joint a", "found": b"inf"}),
         ),
         (
             "balljoint a {\r\rpose 1e999 0 0 }",
-            (
-                "F003.too-large",
-                3,
-                {
-                    "item": "pose of joint a",
-                    "found": b"1e999",
-                },
-            ),
+            ("F003.too-large", 3, {"item": "pose of joint a", "found": b"1e999"}),
         ),
         (
             "balljoint a { rotxlimit 0 3.5e38 }",
-            (
-                "F003.too-large",
-                1,
-                {
-                    "item": "rotxlimit of joint a",
-                    "found": b"3.5e38",
-                },
-            ),
+            ("F003.too-large", 1, {"item": "rotxlimit of joint a", "found": b"3.5e38"}),
         ),
         (
             "balljoint a { rotylimit 0 1,5 }",
-            (
-                "F002.number",
-                1,
-                {
-                    "item": "rotylimit of joint a",
-                    "found": b"1,5",
-                },
-            ),
+            ("F002.number", 1, {"item": "rotylimit of joint a", "found": b"1,5"}),
         ),
         (
             "balljoint a { rotzlimit 0 1_000 }",
-            (
-                "F002.number",
-                1,
-                {
-                    "item": "rotzlimit of joint a",
-                    "found": b"1_000",
-                },
-            ),
+            ("F002.number", 1, {"item": "rotzlimit of joint a", "found": b"1_000"}),
         ),
         (
             "balljoint a { boxmin 1.0-2.0 3 4 }",
-            (
-                "F002.number",
-                1,
-                {
-                    "item": "boxmin of joint a",
-                    "found": b"1.0-2.0",
-                },
-            ),
+            ("F002.number", 1, {"item": "boxmin of joint a", "found": b"1.0-2.0"}),
         ),
         (
             "balljoint a { boxmax 1 2 \u0663 }",
-            (
-                "F002.number",
-                1,
-                {
-                    "item": "boxmax of joint a",
-                    "found": b"\xd9\xa3",
-                },
-            ),
+            ("F002.number", 1, {"item": "boxmax of joint a", "found": b"\xd9\xa3"}),
         ),
         (
             "balljoint a { offset 1 2\0 3 }",
-            (
-                "F002.number",
-                1,
-                {
-                    "item": "offset of joint a",
-                    "found": b"2\x00",
-                },
-            ),
+            ("F002.number", 1, {"item": "offset of joint a", "found": b"2\x00"}),
         ),
         (
             "balljoint a {\noffset 1 2\n}",
-            (
-                "F002.width",
-                2,
-                {
-                    "item": "offset of joint a",
-                    "expected": 3,
-                    "found": 2,
-                },
-            ),
+            ("F002.width", 2, {"item": "offset of joint a", "expected": 3, "found": 2}),
         ),
         (
             "balljoint {\npose\nballjoint b {}",
-            (
-                "F002.width",
-                2,
-                {
-                    "item": "pose of unnamed joint",
-                    "expected": 3,
-                    "found": 0,
-                },
-            ),
+            ("F002.width", 2, {"item": "pose of unnamed joint", "expected": 3, "found": 0}),
         ),
         (
             "balljoint a {\noffset 1 2",
-            (
-                "F002.width-end",
-                2,
-                {
-                    "item": "offset of joint a",
-                    "expected": 3,
-                    "found": 2,
-                },
-            ),
+            ("F002.width-end", 2, {"item": "offset of joint a", "expected": 3, "found": 2}),
         ),
         (
             "balljoint a { rotxlimit 1\n2 3 }",
-            (
-                "F002.more",
-                2,
-                {
-                    "item": "rotxlimit of joint a",
-                    "expected": 2,
-                    "found": b"3",
-                },
-            ),
+            ("F002.more", 2, {"item": "rotxlimit of joint a", "expected": 2, "found": b"3"}),
         ),
         (
             "balljoint a {\n balljoint b {\n offset 1 2 3\n\n",
@@ -455,10 +350,7 @@ def message(text):
             "balljoint a {\n balljoint b { }\n balljoint {\n",
             ("F002.joint-open", 3, {"found": None, "joint": "unnamed joint", "line": 3}),
         ),
-        (
-            "balljoint a {\nfoo {\n { } balljoint b { }",
-            ("F002.open", 2, {"word": b"foo"}),
-        ),
+        ("balljoint a {\nfoo {\n { } balljoint b { }", ("F002.open", 2, {"word": b"foo"})),
         ("{ balljoint a { }", ("F002.open", 1, {"word": b"{"})),
     ],
 )
