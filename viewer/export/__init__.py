@@ -371,10 +371,10 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
     if is_together(kind, path, options):
         parts = [part if scene is None else _placed(scene, part) for part in there]
         return _Plan(key, [(Selection(parts, scene), path)], omitted)
-    groups = [
-        (Selection([part if scene is None else _upright(scene, part)]), paths[id(part.actor)])
-        for part in there
-    ]
+    groups = []
+    for part in there:
+        actor = part.actor if scene is None else upright_actor(scene, part.actor)
+        groups.append((Selection([replace(part, actor=actor)]), paths[id(part.actor)]))
     return _Plan(key, groups, omitted)
 
 
@@ -383,10 +383,6 @@ def _suited(part: Part, path: Path) -> str:
     if part.content == "frames":
         return suited_exporter(path, part.actor.figure)
     return exporters_of(path, part.content)[0]
-
-
-def _upright(scene: Scene, part: Part) -> Part:
-    return replace(part, actor=upright_actor(scene, part.actor))
 
 
 def _placed(scene: Scene, part: Part) -> Part:
@@ -428,25 +424,20 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
                 names.append(person_label(person))
             else:
                 names.append(printable(path.name if len(each.parts) == 1 else part.frames.name))
-    return (
-        [
-            note(
-                "X005.untracked: {names}: not tracked, possibly a different person in each frame",
-                names=all_of(names),
-            )
-        ]
-        if names
-        else []
-    )
+    if not names:
+        return []
+    return [
+        note(
+            "X005.untracked: {names}: not tracked, possibly a different person in each frame",
+            names=all_of(names),
+        )
+    ]
 
 
 def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
     count = sum(len(actor.hidden_parts) for actor in actors)
-    return (
-        [note("X005.hidden-parts: {n} also written", n=counted(count, "hidden part", "is", "are"))]
-        if count
-        else []
-    )
+    n = counted(count, "hidden part", "is", "are")
+    return [note("X005.hidden-parts: {n} also written", n=n)] if count else []
 
 
 class _CallableModule(ModuleType):

@@ -48,14 +48,12 @@ class Sparse:
     """A checked sparse matrix in compressed columns ("csc"), rows ("csr") or as entries ("coo")."""
 
     shape: tuple[int, int]
-    """(2,). Rows and columns as declared by the file, to be checked before a dense matrix is
-    created."""
+    """Rows and columns as the file declares them, to be checked before a dense matrix is made."""
     data: NDArray[np.generic]
     indices: NDArray[np.integer]
-    """(N,). Stored values, and the row (csc, coo) or column (csr) of each."""
+    """(N,): stored values, and the row (csc, coo) or column (csr) of each."""
     indptr: NDArray[np.integer]
-    """(columns + 1,), (rows + 1,) or (N,). Start of each column (csc) or row (csr) in ``data``; the
-    column of each value (coo)."""
+    """Start of each column (csc) or row (csr) in ``data``, and its end; columns of values (coo)."""
     layout: str
     """``"csc"``, ``"csr"`` or ``"coo"``."""
 

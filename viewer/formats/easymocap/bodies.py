@@ -113,8 +113,12 @@ def body_layout(record: Record, usual: Mapping[str, int] | None = None) -> BodyL
 
 
 def _odd_length(expected: list[int], found: int) -> RecordError:
-    sentence = "expected {expected} numbers, found {found}"
-    return RecordError("poses", sentence, expected=one_of(expected), found=found)
+    return RecordError(
+        "poses",
+        "expected {expected} numbers, found {found}",
+        expected=one_of(expected),
+        found=found,
+    )
 
 
 def with_coefficients(layout: BodyLayout, record: Record, usual: Mapping[str, int]) -> BodyLayout:
@@ -202,9 +206,8 @@ class BodyRows(Rows):
     layout: BodyLayout
     """Layout of all records."""
     known: dict[str, Floats] | None = None
-    """mapping of str to (C,), or None. The person's last coefficients before these rows, which
-    ``values`` updates; None for people without an identity, whose rows are independent of each
-    other."""
+    """The person's last coefficients (C,) by key, which ``values`` updates; None for people without
+    an identity, whose rows are independent of each other."""
     buffers: list[array[float]] = field(default_factory=list)
     """Values of the layout's keys, record after record."""
     remarks: list[_Remark] = field(default_factory=list)

@@ -388,9 +388,8 @@ class ImageFolders:
         except FormatError as problem:
             self._faults[path] = str(problem)
         except OSError as problem:
-            self._faults[path] = str(
-                note(wording.PICTURE, path, reason=str(problem.strerror or problem))
-            )
+            reason = str(problem.strerror or problem)
+            self._faults[path] = str(note(wording.PICTURE, path, reason=reason))
         return None
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
@@ -405,7 +404,8 @@ class ImageFolders:
 
     def notes_of(self, camera: str) -> list[str]:
         """Return messages about a camera's missing or unreadable images."""
-        notes = [text for path, text in self._faults.items() if path in self._paths(camera)]
+        paths = set(self._files.get(camera, {}).values())
+        notes = [text for path, text in self._faults.items() if path in paths]
         missing = [number for number in self._frames if number not in self._files.get(camera, {})]
         if missing and camera in self._folders:
             folder = printable(self._folders[camera])
@@ -413,9 +413,6 @@ class ImageFolders:
             which = f"{len(missing)} of {len(self._frames)} frames have no image: {named}"
             notes.append(f"{folder}: {which}")
         return notes
-
-    def _paths(self, camera: str) -> set[Path]:
-        return set(self._files.get(camera, {}).values())
 
 
 def find_images(

@@ -51,25 +51,24 @@ class Track:
     """One person in one space."""
 
     frames: NDArray[np.int64]
-    """(N,) int. Frames of the video in which the person is present, without duplicates."""
+    """(N,): frames of the video in which the person is present, each once."""
     joint_names: tuple[str, ...] = ()
     """Joints that ``vectors`` rotate, the root first; empty if there are only points."""
     vectors: Floats | None = None
-    """(N, K, 3). Rotation vectors relative to the parent joint, radians."""
+    """(N, K, 3): rotation vectors relative to the parent joint, radians."""
     translations: Floats | None = None
-    """(N, 3). Metres."""
+    """(N, 3): metres."""
     shape: Floats | None = None
-    """(N, S), (1, S) or None. Shape coefficients."""
+    """(N, S) or (1, S): shape coefficients."""
     hands: dict[str, Floats] = field(default_factory=dict)
-    """mapping of side to (N, C). As for ``BodyMotion``; zeros mean the mean hand."""
+    """(N, C) by side, as for ``BodyMotion``; zeros mean the mean hand."""
     world_rotations: Floats | None = None
-    """(N, 3) or None. As for ``BodyMotion``."""
+    """(N, 3): as for ``BodyMotion``."""
     layout: PointLayout | None = None
     points: Floats | None = None
-    """PointLayout, (N, P, 4). Captured points, instead of a body."""
+    """(N, P, 4): captured points in this layout, instead of a body."""
     rig: tuple[Floats, ...] | None = None
-    """tuple of (N, P), (N, S), (N, E), (N, 3), or None. Model parameters, identity, expression and
-    position of the Momentum Human Rig."""
+    """Model parameters (N, P), identity (N, S), expression (N, E) and position (N, 3) of MHR."""
     places_root: bool = False
     """As for ``BodyMotion``."""
     gender: str = ""
@@ -126,13 +125,12 @@ class Cameras:
     """The camera of a video in each frame: K (R X + T) in pixels, as for ``CameraView``."""
 
     frames: NDArray[np.int64]
-    """(N,) int. Frames of the video."""
+    """(N,): frames of the video."""
     intrinsics: Floats
-    """(N, 3, 3) or (1, 3, 3). K, pixels."""
+    """K (N, 3, 3) or (1, 3, 3), pixels."""
     rotations: Floats
     translations: Floats
-    """(N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not
-    move."""
+    """R (N, 3, 3) and T (N, 3); a single row of both if the camera does not move."""
     size: tuple[int, int] | None = None
     """Width and height of the video, pixels."""
 
@@ -159,8 +157,7 @@ class Results:
     model: str
     """The member of the SMPL family, or ``"MHR"``; empty if there are no bodies."""
     people: Mapping[str, Mapping[int, Track]]
-    """``"world"`` and ``"camera"``, or only the space that the file has; the first is the
-    default."""
+    """By space, ``"world"`` or ``"camera"``; the first one of the file is the default."""
     ups: Mapping[str, str]
     """The axis that points up; empty if it is unknown."""
     cameras: Mapping[str, Cameras] = field(default_factory=dict)

@@ -56,15 +56,13 @@ class _Person:
     keypoints: Floats
     joints: Floats
     vertices: Floats
-    """(N, K, 3), (N, J, 3), (N, V, 3). Positions relative to the person; no points if the file has
-    none."""
+    """(N, K, 3), (N, J, 3), (N, V, 3): positions relative to the person; may have no points."""
     rotations: Floats | None
-    """(N, J, 3, 3) or None. Rotations of the joints, joint to world."""
+    """(N, J, 3, 3): rotations of the joints, joint to world."""
     translations: Floats
-    """(N, 3). Position of the person in front of the camera, in the same axes."""
+    """(N, 3): position of the person in front of the camera, in the same axes."""
     parameters: dict[str, Floats]
-    """dict of str to (N, C). Parameters of the rig, by their keys in the file:
-    ``mhr_model_params``, ``shape_params`` …."""
+    """(N, C): parameters of the rig by their keys in the file, as ``shape_params``."""
 
 
 def read_person(archive: Archive, with_vertices: bool = True) -> _Person:
