@@ -79,9 +79,9 @@ def runs(monkeypatch):
     """The number of poses for which forward kinematics ran."""
     counted, run = [], kinematics.forward_kinematics
 
-    def count(parents, local, root=None):
+    def count(parents, local):
         counted.extend([1] * (local.shape[1] if local.ndim == 4 else 1))
-        return run(parents, local, root)
+        return run(parents, local)
 
     monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
     return counted
