@@ -41,6 +41,7 @@ from viewer.formats import check_targets, file_stem
 from viewer.lint import Finding, places_of
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
 from viewer.phrases import counted, printable
+from viewer.rendering.framing import frames_looked_at
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import QUALITIES, SIZE, DisplayOptions
@@ -420,8 +421,7 @@ def recorded_times(state: AppState, settings: RecordSettings) -> tuple[Floats, l
     first = clock.first_frame if rate == clock.frame_rate else 0
     first += frame_at(start - clock.origin, rate)
     if settings.kind == "sheet":
-        last = len(times) - 1
-        chosen = np.unique(np.rint(np.linspace(0, last, settings.n_cells)).astype(int))
+        chosen = np.array(frames_looked_at(len(times), settings.n_cells))
         return times[chosen], (first + chosen).tolist(), rate
     return times, list(range(first, first + len(times))), rate
 
