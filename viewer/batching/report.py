@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import field, fields
 from pathlib import Path
-from types import TracebackType
 
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
@@ -108,12 +107,7 @@ class ReportFile:
     def __enter__(self) -> ReportFile:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _ends_within_line(self) -> bool:
