@@ -120,6 +120,14 @@ def own_settings(settings_folder: str) -> None:
         os.environ[name] = f"{folder}/{name}"
 
 
+@pytest.fixture
+def rig(tmp_path: Path) -> tuple[Path, Path]:
+    """The paths of the tiny skeleton and its skin."""
+    from app.tiny import write_rig
+
+    return write_rig(tmp_path)
+
+
 @pytest.fixture(scope="module")
 def family(tmp_path_factory):
     """Figures of the SMPL family by kind, each read once."""

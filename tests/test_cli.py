@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from app.tiny import write_rig
 from children import listening
 
 import viewer
@@ -27,11 +26,6 @@ def call(*arguments, cwd=None, environment=None, **settings):
     settings = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 60, **settings}
     variables = {**ENVIRONMENT, **(environment or {})}
     return subprocess.run([*COMMAND, *arguments], cwd=cwd, env=variables, check=False, **settings)
-
-
-@pytest.fixture
-def rig(tmp_path):
-    return write_rig(tmp_path)
 
 
 def _refused(done, code, *words):

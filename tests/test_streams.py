@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from app.tiny import write_rig
 
 from viewer.errors import OutputError
 from viewer.formats import all_or_none, save_bytes
@@ -23,11 +22,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path(NAMES[0]).exists(), reason="no name for the output stream"),
 ]
-
-
-@pytest.fixture
-def rig(tmp_path):
-    return [str(path) for path in write_rig(tmp_path)]
 
 
 def shell(line: str, *words: str, folder: Path | None = None) -> subprocess.CompletedProcess:

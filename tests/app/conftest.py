@@ -5,7 +5,6 @@ import pytest
 from app import box_body
 from app.curves.plotted import SIZE, clip_text
 from app.driver import Driver
-from app.tiny import write_rig
 from formats.synthetic_smpl import model
 from imgui_bundle import imgui
 
@@ -17,12 +16,6 @@ def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     settings = tmp_path / "state" / "models.json"
     monkeypatch.setattr("viewer.models._settings_file", lambda: settings)
-
-
-@pytest.fixture
-def rig(tmp_path):
-    """The paths of the tiny skeleton and its skin."""
-    return write_rig(tmp_path)
 
 
 @pytest.fixture

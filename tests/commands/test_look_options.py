@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app.tiny import write_rig
 from formats.archive.joblib_bytes import joblib_file
 from formats.torch.torch_bytes import torch_zip
 from formats.video_mocap.tool_files import gvhmr
@@ -22,17 +21,12 @@ _SMALL = ("--size", "160x120", "--quality", "draft", "--no-grid", "--background"
 
 
 @pytest.fixture
-def rig(tmp_path):
-    return [str(path) for path in write_rig(tmp_path)]
-
-
-@pytest.fixture
 def drawn(tmp_path, rig):
     """Render the tiny rig and return its pixels."""
 
     def picture(*options: str) -> np.ndarray:
         out = str(tmp_path / "x.png")
-        assert run(["render", *rig, "-o", out, "--force", *_SMALL, *options]) == 0
+        assert run(["render", *map(str, rig), "-o", out, "--force", *_SMALL, *options]) == 0
         with Image.open(out) as image:
             return np.asarray(image.convert("RGB"))
 
@@ -71,7 +65,7 @@ def test_picture_that_follows_a_joint_aims_at_it(drawn):
 )
 def test_options_that_do_not_apply_are_refused(tmp_path, rig, capsys, options, text):
     out = tmp_path / "x.png"
-    assert run(["render", *rig, "-o", str(out), *options]) == 2
+    assert run(["render", *map(str, rig), "-o", str(out), *options]) == 2
     assert text in capsys.readouterr().err and not out.exists()
 
 

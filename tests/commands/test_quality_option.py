@@ -46,17 +46,12 @@ _QUICK = ("--size", "320x240", "--quality", "draft", "--force")
 
 
 @pytest.fixture
-def rig(tmp_path):
-    return [str(path) for path in write_rig(tmp_path)]
-
-
-@pytest.fixture
 def render(tmp_path, capsys):
     """Render an image; return its pixels or None, and the error output."""
 
     def drawn(*arguments):
         path = tmp_path / "x.png"
-        assert run(["render", *arguments, *_QUICK, "-o", str(path)]) == 0
+        assert run(["render", *map(str, arguments), *_QUICK, "-o", str(path)]) == 0
         return np.array(Image.open(path)).astype(int), capsys.readouterr().err
 
     return drawn

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from app.tiny import write_rig
 from PIL import Image
 from rig.hand_made import mesh
 
@@ -23,12 +22,6 @@ _SMALL = ("--size", "160x120", "--quality", "draft")
 @pytest.fixture(scope="module")
 def body():
     return str(resource("assets", "samples", "body.npz"))
-
-
-@pytest.fixture
-def rig(tmp_path):
-    """The paths of the tiny skeleton and its skin."""
-    return write_rig(tmp_path)
 
 
 @pytest.fixture

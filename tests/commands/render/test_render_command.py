@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app.tiny import write_rig
 from PIL import Image
 
 import viewer
@@ -27,11 +26,6 @@ SMALL = ("--size", "40x30", "--quality", "draft")
 def _size(path):
     with Image.open(path) as picture:
         return picture.size
-
-
-@pytest.fixture
-def rig(tmp_path):
-    return write_rig(tmp_path)
 
 
 @pytest.fixture
