@@ -22,7 +22,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Phrase, note, wording
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES, Source
 from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
@@ -406,7 +406,7 @@ class _Archive:
             )
 
     def _fault(self, key: str, **values: Any) -> FormatError:
-        return FormatError(Diagnostic(key, self.shown, values=values))
+        return FormatError(note(key, self.shown, **values))
 
 
 @contextmanager

@@ -55,9 +55,9 @@ def kept_note(present: Bools, first_frame: int) -> list[Diagnostic]:
     if present.all():
         return []
     return [
-        Diagnostic(
+        note(
             "X004.kept: {noun} {gaps} missing, as in the original motion",
-            values=_gaps(present, first_frame),
+            **_gaps(present, first_frame),
         )
     ]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note
@@ -69,20 +69,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         "size": file_size(len(data)),
     }
     notes = [
-        Diagnostic(
-            "X001.vrma: {bones}, {expressions}, {frames} at {rate:g} fps, {size}",
-            path,
-            values=values,
-        ),
+        note("X001.vrma: {bones}, {expressions}, {frames} at {rate:g} fps, {size}", path, **values),
         *errors,
     ]
     notes += gaps_note(animation.frames.present, animation.first_frame, options.closing)
     others = animation.figure.require_skeleton().n_joints - len(bones)
     if others:
         notes.append(
-            Diagnostic(
+            note(
                 "X003.vrma-joints: {n} without a human bone {are} omitted",
-                values={"n": counted(others, "joint"), "are": agree(others, "is", "are")},
+                n=counted(others, "joint"),
+                are=agree(others, "is", "are"),
             )
         )
     return notes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import FormatError
 from viewer.media.video_reading import VideoFrames
 from viewer.rig.captures.cameras import CameraImage
@@ -51,11 +51,11 @@ class VideoImages:
             values = {"seconds": length, "end": self._end}
             notes.append(
                 str(
-                    Diagnostic(
+                    note(
                         "F007.video-short: the video ends at {seconds:.2f} s, the capture at "
                         "{end:.2f} s",
                         video.path,
-                        values=values,
+                        **values,
                     )
                 )
             )

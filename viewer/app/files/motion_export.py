@@ -22,7 +22,7 @@ from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_it
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_where_to_write
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import RigError
 from viewer.export import (
     EXPORTERS,
@@ -223,9 +223,9 @@ def _motions(
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
             notes.append(
-                Diagnostic(
+                note(
                     "X003.absent-in-range: {figure}: absent throughout the range, not exported",
-                    values={"figure": actor.name},
+                    figure=actor.name,
                 )
             )
             continue
@@ -243,7 +243,7 @@ def _motions(
                 "have": agree(count, "has", "have"),
                 "remedy": Remedy("can write", "--bake-springs writes"),
             }
-            notes.append(Diagnostic(wording.SPRINGS, values=values))
+            notes.append(note(wording.SPRINGS, **values))
         is_keyed = actor.keyed is not None
         rate = state.clock.frame_rate if is_keyed else None
         saved = () if frames is not None else _written_keys(state, actor, file)
@@ -254,10 +254,7 @@ def _motions(
     if everyone and points:
         names = [actor.name for actor in points]
         notes.append(
-            Diagnostic(
-                "X003.points: captured points are not exported: {names}",
-                values={"names": all_of(names)},
-            )
+            note("X003.points: captured points are not exported: {names}", names=all_of(names))
         )
     return motions, selected, notes
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.export._losses.largest_distances import negligible
 from viewer.export._losses.posed_bodies import Side, vertices
 from viewer.export.gltf.body import Body, Built, add_body, body_of
@@ -151,11 +151,11 @@ def figure_losses(
                 "are": agree(len(early), "is", "are"),
             }
             notes.append(
-                Diagnostic(
+                note(
                     "X005.negative-times: {n} before 0, which glTF does not allow, and {are} "
                     "shifted "
                     "to begin at 0: {names}",
-                    values=values,
+                    **values,
                 )
             )
         notes += _without_effect(added, added.clips)
@@ -173,13 +173,11 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
     ]
     if idle:
         notes.append(
-            Diagnostic(
+            note(
                 "X003.idle-animations: {n} no effect on what is written and {are} omitted: {names}",
-                values={
-                    "names": listed(idle),
-                    "n": counted(len(idle), "animation", "has", "have"),
-                    "are": agree(len(idle), "is", "are"),
-                },
+                names=listed(idle),
+                n=counted(len(idle), "animation", "has", "have"),
+                are=agree(len(idle), "is", "are"),
             )
         )
     moved = [placed.part.targets for placed in added.built.meshes]
@@ -196,9 +194,9 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
             "change": agree(len(lost), "changes", "change"),
         }
         notes.append(
-            Diagnostic(
+            note(
                 "X003.idle-shapes: keys of {n} that {change} no vertex are omitted: {names}",
-                values=values,
+                **values,
             )
         )
     return notes
@@ -251,11 +249,11 @@ def _clip_losses(
         "causes": optional(": {}", causes),
     }
     notes = [
-        Diagnostic(
+        note(
             "X002.animations: {vertices} differ by up to {length}{place}, compared at {times} "
             "in {n}{causes}",
             written.path,
-            values=values,
+            **values,
         )
     ]
     return notes + first_set_note(expected, read, figure, rows, least, body.influences)

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.largest_distances import (
     apart,
@@ -317,10 +317,10 @@ def first_set_note(
     most, worst = int(influences.most), found.vertices
     if worst is None:
         return [
-            Diagnostic(
+            note(
                 "X005.influences: up to {most} influences per vertex, all of them written, "
                 "strongest first",
-                values={"most": most},
+                most=most,
             )
         ]
     values = {
@@ -331,11 +331,11 @@ def first_set_note(
         "extent": optional(" ({})", extent_of(found)),
     }
     return [
-        Diagnostic(
+        note(
             "X002.first-influences: up to {most} influences per vertex, all of them written, "
             "strongest first; programs that read only the first four are wrong by up to "
             "{length}{extent}",
-            values=values,
+            **values,
         )
     ]
 
@@ -429,12 +429,7 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     }
     notes = not_held_note("glTF", lost)
     notes += (
-        [
-            Diagnostic(
-                "X003.file-members: {n} of the original file {are} not copied: {names}",
-                values=values,
-            )
-        ]
+        [note("X003.file-members: {n} of the original file {are} not copied: {names}", **values)]
         if members
         else []
     )
@@ -446,10 +441,10 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     }
     return notes + (
         [
-            Diagnostic(
+            note(
                 "X003.file-nodes: {n} of the original file without a joint, mesh or camera {are} "
                 "not copied: {names}",
-                values=values,
+                **values,
             )
         ]
         if nodes

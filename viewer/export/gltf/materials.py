@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.export.gltf.document import Document, named
 from viewer.media.png import encode_png
 from viewer.phrases import brief
@@ -159,18 +159,18 @@ def material_losses(mesh: Mesh) -> list[Diagnostic]:
         metallic, roughness = material.metallic_texture, material.roughness_texture
         if metallic and roughness and not _same_place(metallic, roughness):
             lost.append(
-                Diagnostic(
+                note(
                     "X005.metallic-placement: material {material}: its metallic map uses the "
                     "placement "
                     "of its roughness map",
-                    values=values,
+                    **values,
                 )
             )
         if any(_placement(one.matrix)[1] > _SHEAR for one in material.textures.values()):
             lost.append(
-                Diagnostic(
+                note(
                     "X003.texture-shear: material {material}: the shear of its textures is omitted",
-                    values=values,
+                    **values,
                 )
             )
     return lost

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.export._exporter import Part
 from viewer.export._gaps import filled, gaps_note
@@ -165,8 +165,6 @@ def motion_remarks(sampled: Sampled, options: ExportOptions) -> list[Diagnostic]
             "translate": agree(len(names), "translates", "translate"),
         }
         notes.append(
-            Diagnostic(
-                "X005.joints-translate: {n} below the root {translate}: {names}", values=values
-            )
+            note("X005.joints-translate: {n} below the root {translate}: {names}", **values)
         )
     return notes

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.export import gltf
 from viewer.export._exporter import Part, Selection
@@ -71,11 +71,12 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         record, names = _repaired(record, bones)
         if names:
             notes.append(
-                Diagnostic(
+                note(
                     "X005.vrm-repaired: corrected, because the VRM file violated the "
                     "specification: "
                     "{names}",
-                    values={"names": listed(names), "n": len(names)},
+                    names=listed(names),
+                    n=len(names),
                 )
             )
         told = record.extensions["VRMC_vrm"].get("meta")
@@ -89,14 +90,12 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         still = replace(still, figure=figure, pose=figure_pose(figure))
         if lost := record.old_members:
             notes.append(
-                Diagnostic(
+                note(
                     "X003.vrm-upgrade: {n} of the VRM 0.x file {have} no counterpart in VRM 1.0: "
                     "{names}",
-                    values={
-                        "names": listed([*lost], 8),
-                        "n": counted(len(lost), "member"),
-                        "have": agree(len(lost), "has", "have"),
-                    },
+                    names=listed([*lost], 8),
+                    n=counted(len(lost), "member"),
+                    have=agree(len(lost), "has", "have"),
                 )
             )
     if record is not None:
@@ -109,10 +108,10 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     still = replace(still, figure=figure, pose=figure_pose(figure))
     if angle > _STRAIGHT:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.t-pose: the rest pose is a T-pose, as VRM requires: joints are rotated by up "
                 "to {degrees} degrees",
-                values={"degrees": rounded(float(np.degrees(angle)))},
+                degrees=rounded(float(np.degrees(angle))),
             )
         )
     notes += _unit_notes(actor.figure)
@@ -234,9 +233,9 @@ def _extended(figure: Figure, tails: Mapping[int, Floats]) -> Figure:
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
     """Return a note about lengths that are converted, or whose unit is unknown."""
     if figure.unit not in METRES:
-        return [Diagnostic(wording.UNIT_UNKNOWN_METRES, values={"figure": figure.name})]
+        return [note(wording.UNIT_UNKNOWN_METRES, figure=figure.name)]
     if METRES[figure.unit] != 1.0:
-        return [Diagnostic(wording.UNIT_CONVERTED, values={"unit": UNIT_NAMES[figure.unit]})]
+        return [note(wording.UNIT_CONVERTED, unit=UNIT_NAMES[figure.unit])]
     return []
 
 
@@ -246,9 +245,9 @@ def _left_out(actor: Actor) -> list[Diagnostic]:
     if actor.clip is not None or figure.animations:
         n = max(len(figure.animations), 1)
         notes.append(
-            Diagnostic(
+            note(
                 "X003.vrm-motions: {n} omitted: VRM files store no motion; write motions as .glb",
-                values={"n": counted(n, "animation", "is", "are")},
+                n=counted(n, "animation", "is", "are"),
             )
         )
     elif actor.pose is not None:
@@ -315,10 +314,10 @@ def _add_made(
     notes = [_written(extensions["VRMC_vrm"], extensions)]
     if meta["licenseUrl"] != LICENCE:
         notes.append(
-            Diagnostic(
+            note(
                 "X005.vrm-licence: programs may refuse a VRM 1.0 file with a licence other than "
                 "{licence}",
-                values={"licence": LICENCE},
+                licence=LICENCE,
             )
         )
     return notes
@@ -347,7 +346,7 @@ def _written(data: Mapping[str, Any], extensions: Mapping[str, Any]) -> Diagnost
         Phrase("{n}", n=counted(n_expressions, "expression")),
     ]
     parts.append(Phrase("{n}", n=counted(n_chains, "spring chain")))
-    return Diagnostic("X001.vrm: VRM 1.0: {parts}", values={"parts": all_of(parts)})
+    return note("X001.vrm: VRM 1.0: {parts}", parts=all_of(parts))
 
 
 def _size(data: object) -> int:
@@ -377,9 +376,9 @@ def _lost(lost: Counter[str]) -> list[Diagnostic]:
     ]
     return (
         [
-            Diagnostic(
+            note(
                 "X003.vrm-lost: references of the VRM file to parts that are not written: {parts}",
-                values={"parts": all_of(parts)},
+                parts=all_of(parts),
             )
         ]
         if parts
@@ -401,18 +400,16 @@ def checked_meta(meta: VrmMeta, figure: str) -> Json:
     """Return meta data for a new VRM 1.0; without authors or a licence it raises RigError."""
     if not any(meta.authors) or not meta.licence:
         raise RigError(
-            Diagnostic(
+            note(
                 "F004.vrm-meta: {figure} cannot be written as VRM without author and licence: "
                 "{remedy}",
-                values={
-                    "figure": figure,
-                    "licence": LICENCE,
-                    "remedy": Remedy(
-                        "use viewer convert",
-                        f"add --vrm-author NAME and --vrm-licence URL, such as {LICENCE} (the "
-                        f"strictest permissions)",
-                    ),
-                },
+                figure=figure,
+                licence=LICENCE,
+                remedy=Remedy(
+                    "use viewer convert",
+                    f"add --vrm-author NAME and --vrm-licence URL, such as {LICENCE} (the "
+                    f"strictest permissions)",
+                ),
             )
         )
     return {

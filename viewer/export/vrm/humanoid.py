@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.rig.figure import Figure
@@ -42,9 +42,9 @@ def human_bones(figure: Figure) -> dict[str, int]:
             "n": counted(len(missing), "required human bone"),
         }
         raise RigError(
-            Diagnostic(
+            note(
                 "F004.vrm-bones: {figure} cannot be written as VRM: {n} not found: {names}",
-                values=values,
+                **values,
             )
         )
     return found

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, cast, overload
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source, phrased, too_large, unreadable
 from viewer.phrases import printable
@@ -203,7 +203,7 @@ def value_fault(
 ) -> FormatError:
     """Return an error in the value of a key."""
     values = {"item": printable(key, 60), "problem": phrased(problem, values)}
-    return FormatError(Diagnostic(wording.ARCHIVE_VALUE, path, values=values))
+    return FormatError(note(wording.ARCHIVE_VALUE, path, **values))
 
 
 def _reason(problem: Exception) -> object:

@@ -440,7 +440,7 @@ def find_images(
             else "F001.camera-images-cameras: images need calibrated cameras: intri.yml and "
             "extri.yml next to the recording, found none"
         )
-        raise FormatError(Diagnostic(key, given, values=values))
+        raise FormatError(note(key, given, **values))
     return None
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import counted, listed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
@@ -56,11 +56,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     ]
     other = np.flatnonzero(parents[0] != parents[1])
     values = {"names": listed([pairs.names[place] for place in other])}
-    moved = (
-        [Diagnostic("D001.parents: different parents: {names}", values=values)]
-        if len(other)
-        else []
-    )
+    moved = [note("D001.parents: different parents: {names}", **values)] if len(other) else []
     return replace(
         pairs,
         mismatches=(*pairs.mismatches, *moved),
@@ -86,10 +82,11 @@ def _order_notes(pairs: Pairs, second: Skeleton) -> list[Diagnostic]:
     place = int(other[0])
     here, there = pairs.names[place], _unique_labels(second)[int(pairs.second[order[place]])]
     return [
-        Diagnostic(
+        note(
             "D002.order: joints are in a different order, which matters for .skin and .anim "
             "files: where the first has {first}, the second has {second}",
-            values={"first": here, "second": there},
+            first=here,
+            second=there,
         )
     ]
 
@@ -115,7 +112,7 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
         lone = [name for name in names if name not in known]
         if lone:
             values = {"n": counted(len(lone), what), "side": ordinal, "names": listed(lone)}
-            mismatches.append(Diagnostic(_KEYS[what][0], values=values))
+            mismatches.append(note(_KEYS[what][0], **values))
     names = tuple(first[number] for number in both[:, 0])
     return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Floats, Ints
@@ -89,7 +89,7 @@ def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
     none = np.zeros(0, dtype=np.int32)
     if (first.clip is None) != (second.clip is None):
         lacking = "second" if second.clip is None else "first"
-        still = Diagnostic("D001.no-motion: the {side} has no motion", values={"side": lacking})
+        still = note("D001.no-motion: the {side} has no motion", side=lacking)
         return Steps(np.zeros(0), np.zeros((0, 0)), none, none, 0, (still,))
     if first.figure.skeleton is None or second.figure.skeleton is None or n_poses == 0:
         return Steps(np.zeros(0), np.zeros((0, 0)), none, none)
@@ -104,16 +104,16 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
         values: dict[str, object] = {"first": rounded(lasts[0], 6), "second": rounded(lasts[1], 6)}
         mismatches.append(
-            Diagnostic("D001.durations: durations differ: {first} s and {second} s", values=values)
+            note("D001.durations: durations differ: {first} s and {second} s", **values)
         )
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
         values = {"first": rates[0], "second": rates[1]}
         notes.append(
-            Diagnostic(
+            note(
                 "D002.rates: frame rates differ ({first:g} and {second:g} fps): compared at the "
                 "first",
-                values=values,
+                **values,
             )
         )
     base = 0
@@ -149,10 +149,10 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
             "other_high": rounded(others[1], 6),
         }
         mismatches.append(
-            Diagnostic(
+            note(
                 "D001.limits: {n} different limits, such as {dof}: {low} to {high} and {other_low} "
                 "to {other_high}",
-                values=values,
+                **values,
             )
         )
     dofs = _random_dofs(first, pairs.first, limits, n_poses)

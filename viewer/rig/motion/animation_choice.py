@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import FormatError, RigError
 from viewer.near_names import name_hint
 from viewer.phrases import quoted
@@ -56,9 +56,10 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
         return every[int(wanted) - 1]
     names = tuple(dict.fromkeys(label for label, _ in named))
     raise RigError(
-        Diagnostic(
+        note(
             "F004.animation: no animation is called {name}; {hint}",
-            values={"name": quoted(wanted), "hint": name_hint(wanted, names)},
+            name=quoted(wanted),
+            hint=name_hint(wanted, names),
         )
     )
 

@@ -11,7 +11,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.rig.arrays import Floats, freeze, freeze_fields, frozen
@@ -115,9 +115,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         joint = motion.joint_names[0]
         names = {"motion": motion.name, "joint": joint, "figure": figure.name}
         raise RigError(
-            Diagnostic(
+            note(
                 "F004.body-joint: {motion} moves the joint {joint}, which {figure} does not have",
-                values=names,
+                **names,
             )
         )
     vectors: dict[int, Floats] = {}  # of each joint that moves
@@ -131,9 +131,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     if lost:
         values = {"n": counted(len(lost), "joint"), "figure": figure.name, "names": listed(lost)}
         notes.append(
-            Diagnostic(
-                "F007.joints-left-out: {n} missing from {figure} omitted: {names}", values=values
-            )
+            note("F007.joints-left-out: {n} missing from {figure} omitted: {names}", **values)
         )
     weights, more = _weights(motion, figure)
     # One joint at a time, because long motions fill much of the memory.
@@ -241,9 +239,9 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -
             if coefficients.any():
                 values = {"side": side or "only", "figure": figure.name}
                 notes.append(
-                    Diagnostic(
+                    note(
                         "F007.hand-left-out: {side} hand omitted: {figure} has no hand components",
-                        values=values,
+                        **values,
                     )
                 )
             continue
@@ -251,10 +249,10 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -
         if coefficients[:, used:].any():
             values = {"most": used, "figure": figure.name}
             notes.append(
-                Diagnostic(
+                note(
                     "F007.hand-components-left-out: hand components beyond the {most} of {figure} "
                     "omitted",
-                    values=values,
+                    **values,
                 )
             )
         fingers = coefficients[:, :used] @ hand.components[:used]

@@ -9,7 +9,7 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.phrases import agree, counted, listed
 from viewer.rig.arrays import Floats, Ints
@@ -164,7 +164,7 @@ def apply_record(
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(Diagnostic(wording.POSE, values={"figure": figure.name}))
+        raise RigError(note(wording.POSE, figure=figure.name))
     if record.joint_rotations is not None and not has_layout_of(record.joint_rotations, figure):
         work, notes = rotate_joints(record.joint_rotations, figure, pose)
         _take_over(work, pose)
@@ -217,9 +217,7 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
     }
     names = [Phrase(key) for key, says in left.items() if says]
     return (
-        [Diagnostic("F007.left-as-they-were: unchanged: {names}", values={"names": listed(names)})]
-        if names
-        else []
+        [note("F007.left-as-they-were: unchanged: {names}", names=listed(names))] if names else []
     )
 
 
@@ -237,16 +235,14 @@ def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
         if scale <= 0.0:
             fault = Phrase("scale: expected a positive number, found {found:g}", found=scale)
         kept = {"fault": fault, "scale": before.figure_scale}
-        notes.append(Diagnostic("F007.scale-kept: {fault}; kept at {scale:g}", values=kept))
+        notes.append(note("F007.scale-kept: {fault}; kept at {scale:g}", **kept))
         pose.figure_scale = before.figure_scale
     far = float(np.abs(pose.figure_translation).max())
     if far > _FARTHEST:
         fault = Phrase(
             "translation: expected at most {most:g}, found {found:g}", most=_FARTHEST, found=far
         )
-        notes.append(
-            Diagnostic("F007.translation-kept: {fault}; unchanged", values={"fault": fault})
-        )
+        notes.append(note("F007.translation-kept: {fault}; unchanged", fault=fault))
         pose.figure_translation = before.figure_translation.copy()
     return notes
 
@@ -272,9 +268,9 @@ def _dof(figure: Figure, label: str) -> int:
         why = str(problem).removeprefix(f'"{label}": ')
         values = {"figure": figure.name, "found": label, "reason": why}
         raise RigError(
-            Diagnostic(
+            note(
                 'F002.pose-unknown-dof: expected a DOF of {figure}, found "{found}": {reason}',
-                values=values,
+                **values,
             )
         ) from None
 
@@ -283,9 +279,10 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
     count = int((clamp_dofs(skeleton, dofs) != dofs).sum())
     return (
         [
-            Diagnostic(
+            note(
                 "F007.pose-clamped: {n} of the pose clamped to {their} limits",
-                values={"n": counted(count, "DOF"), "their": agree(count, "its", "their")},
+                n=counted(count, "DOF"),
+                their=agree(count, "its", "their"),
             )
         ]
         if count
@@ -309,9 +306,9 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     if names is None:
         values = {"expected": own, "figure": figure.name, "found": len(vector)}
         raise RigError(
-            Diagnostic(
+            note(
                 "F002.pose-vector: expected {expected} pose values for {figure}, found {found}",
-                values=values,
+                **values,
             )
         )
     # Joints that the model of the vector lacks are reset to rest.
@@ -328,9 +325,9 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     values = {"n": counted(lost, "joint"), "figure": figure.name}
     return (
         [
-            Diagnostic(
+            note(
                 "F007.pose-joints-left-out: {n} of the pose omitted: missing from {figure}",
-                values=values,
+                **values,
             )
         ]
         if lost
@@ -352,9 +349,10 @@ def _apply_part(
     if not known:
         if values.any():
             return [
-                Diagnostic(
+                note(
                     "F007.part-left-out: {part} omitted: {figure} has no such joint",
-                    values={"part": name, "figure": figure.name},
+                    part=name,
+                    figure=figure.name,
                 )
             ]
         return []
@@ -373,10 +371,10 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     if len(values) % 3 or len(values) > 3 * most:
         numbers = {"most": most, "found": counted(len(values), "number")}
         raise RigError(
-            Diagnostic(
+            note(
                 "F002.pose-body: body_pose: expected 3 numbers per joint for at most {most} "
                 "joints, found {found}",
-                values=numbers,
+                **numbers,
             )
         )
     taken = values[: 3 * own]
@@ -387,17 +385,16 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
 def _odd_length(name: str, expected: int, found: int) -> RigError:
     values = {"item": name, "expected": expected, "found": found}
     return RigError(
-        Diagnostic(
-            "F002.pose-part: {item}: expected {expected} numbers, found {found}", values=values
-        )
+        note("F002.pose-part: {item}: expected {expected} numbers, found {found}", **values)
     )
 
 
 def _left_out(rest: Floats, own: int) -> Diagnostic:
     count = int(rest.reshape(-1, 3).any(axis=1).sum())
-    return Diagnostic(
+    return note(
         "F007.body-joints-left-out: {n} in the pose beyond the body's {own} omitted",
-        values={"n": counted(count, "joint"), "own": own},
+        n=counted(count, "joint"),
+        own=own,
     )
 
 
@@ -421,9 +418,10 @@ def _apply_hand(
     if hand is None:
         if values.any():
             return [
-                Diagnostic(
+                note(
                     "F007.hand-part-left-out: {part} omitted: {figure} has no hand components",
-                    values={"part": name, "figure": figure.name},
+                    part=name,
+                    figure=figure.name,
                 )
             ]
         return []

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Ints
@@ -174,11 +174,11 @@ def _misfit(
         ),
     }
     return RigError(
-        Diagnostic(
+        note(
             "F004.joints-unmatched: {motion} does not match {figure}: expected hips and a leg "
             "or an arm in both, found {n}; not recognised in {motion}: {unused}; in {figure}: "
             "{idle}; match them {remedy}",
-            values=values,
+            **values,
         )
     )
 
@@ -212,21 +212,18 @@ def _notes(
         if pairs
         else "F007.joints-matched: {motion} drives {n} of {all} joints of {figure}"
     )
-    notes = [Diagnostic(key, values=values)]
+    notes = [note(key, **values)]
     unused, idle = _left(source, target, partners)
     if idle:
         notes.append(
-            Diagnostic(
-                "F007.joints-at-rest: joints kept at rest: {names}",
-                values={"names": listed(idle, 12)},
-            )
+            note("F007.joints-at-rest: joints kept at rest: {names}", names=listed(idle, 12))
         )
     if unused:
         values = {"motion": titles[0], "names": listed(unused, 12)}
         notes.append(
-            Diagnostic(
+            note(
                 "F007.joints-without-partner: joints of {motion} that drive nothing: {names}",
-                values=values,
+                **values,
             )
         )
     return notes

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Phrase, note
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -53,10 +53,7 @@ def joint_partners(figure: Figure) -> Ints:
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(
-            Diagnostic(
-                "F004.mirror: figure {figure} has no skeleton to mirror",
-                values={"figure": figure.name},
-            )
+            note("F004.mirror: figure {figure} has no skeleton to mirror", figure=figure.name)
         )
     joints = rest_joints(figure)
     mirrored = joints.copy()
@@ -73,9 +70,9 @@ def joint_partners(figure: Figure) -> Ints:
     if len(far) or (partners[partners] != np.arange(len(joints))).any():
         name = skeleton.names[int(far[0])] if len(far) else Phrase("two joints")
         raise RigError(
-            Diagnostic(
+            note(
                 "F004.asymmetric: {joint} has no mirror counterpart: the skeleton is not symmetric",
-                values={"joint": name},
+                joint=name,
             )
         )
     return partners

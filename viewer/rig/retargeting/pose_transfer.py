@@ -22,7 +22,7 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.phrases import listed, printable
 from viewer.rig.arrays import Floats, Ints
@@ -154,7 +154,7 @@ def rotate_joints(
     """
     other = target.skeleton
     if other is None:
-        raise RigError(Diagnostic(wording.POSE, values={"figure": target.name}))
+        raise RigError(note(wording.POSE, figure=target.name))
     # The source joint of each target joint, by name, then by stated bones; -1 for none.
     partners = joints_by_name(source.names, other.names)
     if source.meanings or other.humanoid is not None:
@@ -168,9 +168,8 @@ def rotate_joints(
     if not len(found):
         values = {"pose": source.figure or Phrase("the pose"), "figure": target.name}
         raise RigError(
-            Diagnostic(
-                "F004.no-common-joint: {pose} and {figure} have no joint names in common",
-                values=values,
+            note(
+                "F004.no-common-joint: {pose} and {figure} have no joint names in common", **values
             )
         )
     to_target = up_rotation(source.up, target.up)
@@ -231,26 +230,17 @@ def _notes(
     used = set(partners[partners >= 0].tolist())
     whose = printable(source.figure) or "the pose"
     values: dict[str, object] = {"n": len(used), "all": len(source.names), "figure": whose}
-    notes = [
-        Diagnostic(
-            "F007.joints-taken-over: transferred {n} of {all} joints of {figure}", values=values
-        )
-    ]
+    notes = [note("F007.joints-taken-over: transferred {n} of {all} joints of {figure}", **values)]
     lacking = [name or f"#{joint}" for joint, name in enumerate(source.names) if joint not in used]
     if lacking:
         values = {
             "figure": target.name,
             "names": listed([printable(name, 40) for name in lacking], 12),
         }
-        notes.append(
-            Diagnostic("F007.joints-lacking: {figure} has no joint named {names}", values=values)
-        )
+        notes.append(note("F007.joints-lacking: {figure} has no joint named {names}", **values))
     if missed:
         values = {"names": listed([printable(skeleton.names[joint], 40) for joint in missed], 12)}
         notes.append(
-            Diagnostic(
-                "F007.joints-limited: rotated as far as DOFs and limits allow: {names}",
-                values=values,
-            )
+            note("F007.joints-limited: rotated as far as DOFs and limits allow: {names}", **values)
         )
     return notes

@@ -19,7 +19,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import Remedy, agree, counted, listed, one_of, rounded
 from viewer.rig.arrays import Bools, Floats
@@ -76,11 +76,7 @@ def retarget(
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
-        raise RigError(
-            Diagnostic(
-                "F004.no-skeleton: {figure} has no skeleton to animate", values={"figure": named}
-            )
-        )
+        raise RigError(note("F004.no-skeleton: {figure} has no skeleton to animate", figure=named))
     motion = _in_path_unit(motion)
     source = motion.figure.require_skeleton()
     matches = match_joints(source, target, joint_map, (motion.figure.name, figure.name))
@@ -112,9 +108,8 @@ def retarget(
         figure_translations=place,
         shape_weights=weights,
     )
-    scaled = Diagnostic(
-        "F007.path-scaled: path of the root scaled by {scale}, {by}",
-        values={"scale": rounded(scale), "by": by},
+    scaled = note(
+        "F007.path-scaled: path of the root scaled by {scale}, {by}", scale=rounded(scale), by=by
     )
     idle = [] if joint_map is not None else _limbs_at_rest(motion, figure, matches, rotations)
     notes = [*matches.notes, *idle, *rested, scaled, *notes, *missing]
@@ -354,10 +349,10 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
         "their": agree(len(found), "its parent", "their parents"),
     }
     return [
-        Diagnostic(
+        note(
             "F007.joint-positions-left-out: translations of {n} relative to {their} omitted "
             "(largest: {most} at {joint})",
-            values=values,
+            **values,
         )
     ]
 
@@ -414,9 +409,9 @@ def expression_weights(
     missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
     notes = (
         [
-            Diagnostic(
+            note(
                 "F007.expressions-unmatched: the figure lacks expressions: {names}",
-                values={"names": listed(missing, 12)},
+                names=listed(missing, 12),
             )
         ]
         if missing
@@ -456,7 +451,7 @@ def _limbs_at_rest(
     found, remedy = list[Diagnostic](), Remedy("", " or with --joint-map")
 
     def warn(key: str, **values: object) -> None:
-        found.append(Diagnostic(key, values=values))
+        found.append(note(key, **values))
 
     if unmatched:
         used = set(matches.partners.tolist())
