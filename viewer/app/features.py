@@ -72,7 +72,7 @@ from viewer.app.view.outlines import toggle_outlines
 from viewer.app.weights.weights_panel import toggle_picking, toggle_vertex_info, toggle_weights
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BONES, SHOWN
+from viewer.rendering.options import BONES, SHOWN, Shading
 from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.skeleton import joint_labels, shown_joints
 from viewer.rig.skinning import METHODS
@@ -221,19 +221,19 @@ def _open_panel(state: AppState, name: str) -> None:
 
 def _choices(state: AppState) -> Iterator[Entry]:
     """Yield the choices of shading, skeletons and skinning."""
-    for name, text in SHADING.items():
-        yield Entry(f"Shading: {text}", "choice", partial(_shade, name=name))
-    for name, text in SHOWN.items():
-        yield Entry(f"Show: {text}", "choice", partial(show, what=name))
-    for name, text in BONES.items():
+    for shading, text in SHADING.items():
+        yield Entry(f"Shading: {text}", "choice", partial(_shade, name=shading))
+    for shown, text in SHOWN.items():
+        yield Entry(f"Show: {text}", "choice", partial(show, what=shown))
+    for style, text in BONES.items():
         yield Entry(
-            f"Bones: {text}", "choice", partial(show_bones, style=name), why=no_skeleton(state)
+            f"Bones: {text}", "choice", partial(show_bones, style=style), why=no_skeleton(state)
         )
     for name, method in METHODS.items():
         yield Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
 
 
-def _shade(state: AppState, name: str) -> None:
+def _shade(state: AppState, name: Shading) -> None:
     set_shading(state, name)
     state.say_status(SHADING[name])
 

@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.commands._settings import add_settings, settings_of, stated
@@ -18,7 +18,7 @@ from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BACKGROUNDS, DisplayOptions, parse_color
 from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
+from viewer.rig.inspection.front import FRONTS, Front, WantedFront, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning
@@ -40,7 +40,7 @@ class ViewOptions:
     """The camera, and what is hidden from it."""
 
     azimuth: float | None = setting(None, "degrees about the up axis", metavar="A")
-    front: Front | Literal["auto"] = setting(
+    front: WantedFront = setting(
         "auto",
         "the axis that the figures face, as in --front=-z; the initial view looks from there "
         "(default: {default}, estimated from the figures)",

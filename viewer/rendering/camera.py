@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -20,10 +20,12 @@ with warnings.catch_warnings():
 
 if TYPE_CHECKING:
     from viewer.rig.captures.cameras import CameraView
+    from viewer.rig.inspection.front import Front
     from viewer.rig.scene import Scene
 
 
-VIEWS = {
+NamedView: TypeAlias = Literal["front", "back", "right", "left", "top", "bottom"]
+VIEWS: dict[NamedView, tuple[float, float]] = {
     "front": (0.0, 0.0),
     "back": (180.0, 0.0),
     "right": (-90.0, 0.0),
@@ -155,7 +157,7 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     return right, up, backward
 
 
-def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
+def front_azimuth(front: Front, up: Literal["y", "z"]) -> float:
     """Return the azimuth, in degrees, of a camera that looks straight at a front such as ``"+x"``.
 
     >>> front_azimuth("+z", "y"), front_azimuth("+x", "z"), front_azimuth("-z", "y")
@@ -168,15 +170,15 @@ def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
     return 0.0 if ahead > 0.0 else 180.0
 
 
-def facing_camera(front: str, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
+def facing_camera(front: Front, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
     """Return a camera that views a front from slightly left and above, without framing anything."""
     ahead = front_azimuth(front, up)
     azimuth = _wrapped(ahead + _USUAL_AZIMUTH)
     return Camera(azimuth=azimuth, orthographic=orthographic, up=up, front=ahead)
 
 
-def look_from(camera: Camera, view: str) -> None:
-    """Rotate to a named view, a key of ``VIEWS``."""
+def look_from(camera: Camera, view: NamedView) -> None:
+    """Rotate to a named view."""
     azimuth, camera.inclination = VIEWS[view]
     camera.azimuth = _wrapped(camera.front + azimuth)
 

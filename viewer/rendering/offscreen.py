@@ -18,7 +18,7 @@ from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Scene, scene_points
+from viewer.rig.scene import Scene, Shown, scene_points
 
 _thread = threading.local()
 
@@ -115,7 +115,7 @@ class _OfThread:
             self.offscreen.release()
 
 
-def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> Camera:
+def default_camera(scene: Scene, size: tuple[int, int], show: Shown = "skin") -> Camera:
     """Return a camera that frames the whole scene from the front, slightly left and above."""
     return _framing(scene, size, scene_points(scene, show))
 

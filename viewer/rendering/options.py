@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
 from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
+    from viewer.rig.scene import Shown
     from viewer.rig.skeleton import Skeleton
 
 Color = tuple[float, float, float]
+Shading: TypeAlias = Literal[
+    "auto", "phong", "pbr", "matcap", "normals", "checker", "parts", "scalar"
+]
+Matcap: TypeAlias = Literal["clay", "chrome"]
+Colormap: TypeAlias = Literal[
+    "auto", "viridis", "magma", "inferno", "plasma", "cividis", "turbo", "coolwarm"
+]
+BoneStyle: TypeAlias = Literal["boxes", "octahedra", "sticks", "axes"]
+Bones: TypeAlias = Literal["auto"] | BoneStyle
+Quality: TypeAlias = Literal["draft", "normal", "final"]
 
 SIZE = (1280, 720)
 """Usual width and height of pictures, pixels."""
 
-SHOWN = {
+SHOWN: dict[Shown, str] = {
     "skin": "Attached skin",
     "skeleton": "Skeleton",
     "both": "Skin and skeleton",
@@ -25,10 +36,10 @@ SHOWN = {
 }
 """Parts of a figure that are drawn, with their labels in menus."""
 
-MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
+MATCAPS: dict[Matcap, str] = {"clay": "Clay", "chrome": "Chrome"}
 """Images of lit spheres for the shading ``"matcap"``, with their labels in menus."""
 
-COLORMAPS = {
+COLORMAPS: dict[Colormap, str] = {
     "auto": "Automatic",
     "viridis": "Viridis",
     "magma": "Magma",
@@ -40,7 +51,7 @@ COLORMAPS = {
 }
 """Colour maps of scalar quantities, with their labels in menus: see ``DisplayOptions.colormap``."""
 
-BONES = {
+BONES: dict[Bones, str] = {
     "auto": "Automatic",
     "boxes": "Boxes",
     "octahedra": "Octahedra",
@@ -49,13 +60,13 @@ BONES = {
 }
 """Styles of skeletons, with their labels in menus: see ``DisplayOptions.bones``."""
 
-OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
+OPACITIES: dict[BoneStyle, float] = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
 """Default opacity of a skeleton over the skin: unlike thin shapes, boxes often enclose the skin."""
 
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Names of backgrounds; colours are given as ``#rrggbb``."""
 
-QUALITIES = {
+QUALITIES: dict[Quality, str] = {
     "draft": "Draft",
     "normal": "Normal",
     "final": "Final",
@@ -104,13 +115,13 @@ class Lights:
 class DisplayOptions:
     """All render settings except scene and camera."""
 
-    show: str = setting(
+    show: Shown = setting(
         "skin",
         "parts of the figures; binding is the skin in the bind pose (default: {default})",
         choices=SHOWN,
     )
     """A figure without a mesh always shows its skeleton, one without a skeleton its mesh."""
-    shading: str = setting(
+    shading: Shading = setting(
         "auto",
         "shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
         "phong (default: {default})",
@@ -128,7 +139,7 @@ class DisplayOptions:
         limits=(0.0, 1.0),
         metavar="0..1",
     )
-    matcap: str = setting(
+    matcap: Matcap = setting(
         "clay", "picture for --shading matcap (default: {default})", choices=MATCAPS
     )
     scalar: str = setting(
@@ -145,7 +156,7 @@ class DisplayOptions:
     )
     """None for the range of the values, or a range that excludes outliers for quantities with a
     robust range."""
-    colormap: str = setting(
+    colormap: Colormap = setting(
         "auto",
         f"colours of a continuous quantity, as in matplotlib: {', '.join([*COLORMAPS][1:])} "
         "(default: {default}, dark violet to yellow, or blue through white to red if values have a "
@@ -158,7 +169,7 @@ class DisplayOptions:
         None, "isolines at every tenth of the range (default: for weights only)"
     )
     legend: bool = setting(False, "draw a colour legend")
-    bones: str = setting(
+    bones: Bones = setting(
         "auto",
         "style of skeletons (default: {default}, the boxes of files that have them, otherwise "
         "octahedra)",
@@ -177,7 +188,7 @@ class DisplayOptions:
     """An entry of ``BACKGROUNDS`` or ``"#rrggbb"``."""
     samples: int = setting(4, "samples per pixel (default: {default})", metavar="N")
     """Limited by the driver's maximum."""
-    quality: str = setting(
+    quality: Quality = setting(
         "draft",
         "draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and smoother "
         "edges (default: final for pictures, normal for videos)",
@@ -245,8 +256,8 @@ class DisplayOptions:
         return self.shadows and self.quality != "draft"
 
 
-def bone_style(skeleton: Skeleton, options: DisplayOptions) -> str:
-    """Return the style of a drawn skeleton, a key of ``BONES`` other than ``"auto"``."""
+def bone_style(skeleton: Skeleton, options: DisplayOptions) -> BoneStyle:
+    """Return the style of a drawn skeleton."""
     if options.bones != "auto":
         return options.bones
     return "octahedra" if skeleton.boxes is None or skeleton.boxes_from_bones else "boxes"

@@ -5,7 +5,7 @@ In addition, there is toon shading with rim light and outline, as in ``VRMC_mate
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes, Floats, freeze_fields
 
-ALPHA_MODES = ("opaque", "mask", "blend")
+AlphaMode: TypeAlias = Literal["opaque", "mask", "blend"]
+ALPHA_MODES: tuple[AlphaMode, ...] = ("opaque", "mask", "blend")
 """Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
 background."""
 
@@ -23,7 +24,8 @@ TEXTURES = (
 )
 """Fields of a material that contain textures."""
 
-_WRAPS = ("clamp", "repeat", "mirror")
+Wrap: TypeAlias = Literal["clamp", "repeat", "mirror"]
+_WRAPS: tuple[Wrap, ...] = ("clamp", "repeat", "mirror")
 """Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
 MINIFICATIONS = (
     *("nearest", "linear", "nearest_mipmap_nearest"),
@@ -31,7 +33,8 @@ MINIFICATIONS = (
 )
 """Filters of minified images, with their names in OpenGL and glTF."""
 
-_OUTLINE_MODES = ("world", "screen")
+OutlineMode: TypeAlias = Literal["world", "screen"]
+_OUTLINE_MODES: tuple[OutlineMode, ...] = ("world", "screen")
 """Units of outline widths: lengths, or fractions of the image height."""
 Color = tuple[float, float, float]
 
@@ -67,8 +70,7 @@ class Material:
     """(r, g, b). Emitted light, linear; may exceed 1."""
     emissive_texture: Texture | None = None
     """Colour of the emitted light, sRGB."""
-    alpha_mode: str = "opaque"
-    """Entry of ``ALPHA_MODES``."""
+    alpha_mode: AlphaMode = "opaque"
     alpha_cutoff: float = 0.5
     """Minimum opacity that is drawn in the mode ``"mask"``."""
     double_sided: bool = True
@@ -151,8 +153,8 @@ class Texture:
     """0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``."""
     transform: Floats | None = None
     """(2, 3). Maps texture coordinates to image coordinates, whose v is 0 at the bottom row."""
-    wrap: tuple[str, str] = ("clamp", "clamp")
-    """Entries of ``_WRAPS`` along u and v."""
+    wrap: tuple[Wrap, Wrap] = ("clamp", "clamp")
+    """Along u and v."""
     is_smooth: bool = True
     """Whether pixels are interpolated."""
     minification: str = ""
@@ -224,8 +226,7 @@ class Outline:
 
     width: float
     """At least 0, in the unit of the mode."""
-    mode: str = "world"
-    """Entry of ``_OUTLINE_MODES``."""
+    mode: OutlineMode = "world"
     color: Color = (0.0, 0.0, 0.0)
     """(r, g, b). Linear."""
     mix: float = 1.0

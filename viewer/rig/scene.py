@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
+Shown: TypeAlias = Literal["skin", "skeleton", "both", "binding"]
+"""Parts of a figure that are drawn; ``"binding"`` is the skin in the bind pose."""
+
 # Fraction of outlying points that the camera ignores if they enlarge the bounding box a lot.
 _OUTLIER_FRACTION = 0.001
 # Minimum ratio of the bounding boxes with and without outliers for which they are ignored.
@@ -228,7 +231,7 @@ class Scene:
         return self.actors[0].figure.up if self.actors else "y"
 
 
-def scene_points(scene: Scene, show: str = "skin") -> Floats:
+def scene_points(scene: Scene, show: Shown = "skin") -> Floats:
     """Return the points (N, 3) to fit into the view, at least the origin.
 
     A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
@@ -246,12 +249,12 @@ def scene_points(scene: Scene, show: str = "skin") -> Floats:
     return np.clip(points, *inner) if has_outliers else points
 
 
-def scene_box(scene: Scene, show: str = "skin") -> Floats:
+def scene_box(scene: Scene, show: Shown = "skin") -> Floats:
     """Return the box around ``scene_points``: lowest and highest corner, (2, 3)."""
     return bounding_box(scene_points(scene, show))
 
 
-def actor_points(actor: Actor, show: str = "skin") -> Floats:
+def actor_points(actor: Actor, show: Shown = "skin") -> Floats:
     """Return the points (N, 3) of an actor's drawn parts, or of a part that the figure has."""
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]

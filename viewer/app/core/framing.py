@@ -17,7 +17,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, Scene, scene_points
+from viewer.rig.scene import Actor, Scene, Shown, scene_points
 
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
@@ -65,7 +65,7 @@ class _MotionExtent:
         """Bounding box of the points: (2, 3)."""
         return bounding_box(self.points)
 
-    def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
+    def look(self, scene: Scene, clock: Clock, show: Shown, grows: bool) -> bool:
         """Sample a few more frames with these parts shown; return whether there were any left."""
         shapes = tuple(map(_own_shape, scene.actors))
         motions = tuple(map(_own_motion, scene.actors))
@@ -113,7 +113,7 @@ class _MotionExtent:
         left = wanted - self._clouds.keys()
         return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
 
-    def _cloud(self, scene: Scene, clock: Clock, time: float, show: str) -> Floats:
+    def _cloud(self, scene: Scene, clock: Clock, time: float, show: Shown) -> Floats:
         """Return the outermost points at one time; none if all actors are absent."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):

@@ -26,7 +26,7 @@ from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Legend
 from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import Front, guess_front
+from viewer.rig.inspection.front import WantedFront, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, scene_points
 
@@ -197,7 +197,7 @@ class AppState:
         """Record an edit of the scene; while a widget is held, the edit is in progress."""
         self.history.observe(self.update_version(), busy)
 
-    def set_front(self, front: Front) -> None:
+    def set_front(self, front: WantedFront) -> None:
         """Set the axis that figures face, or estimate it (``"auto"``); the camera rotates along."""
         ahead = front_azimuth(guess_front(self.scene) if front == "auto" else front, self.scene.up)
         orbit(self.camera, ahead - self.camera.front, 0.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from imgui_bundle import imgui
 
@@ -21,6 +21,7 @@ from viewer.rig.number_text import number_text
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+_Key = TypeVar("_Key", bound=str)
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 # Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
@@ -254,8 +255,8 @@ def same_line_if_room(text: str) -> None:
 
 
 def choice(
-    state: AppState, label: str, value: str, texts: dict[str, str], width: float = 0.0
-) -> str:
+    state: AppState, label: str, value: _Key, texts: Mapping[_Key, str], width: float = 0.0
+) -> _Key:
     """Draw a drop-down list and return the chosen key; ``width`` is that of ``begin_field``."""
     keys = list(texts)
     index = keys.index(value) if value in keys else 0

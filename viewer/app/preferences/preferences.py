@@ -12,7 +12,7 @@ import platformdirs
 from viewer.data_classes import dataclass, setting
 from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
-from viewer.rendering.options import QUALITIES
+from viewer.rendering.options import QUALITIES, Quality
 
 CAPTURED = "captured"
 """Value of ``Appearance.captured`` in the frame in which the key was pressed."""
@@ -37,7 +37,7 @@ class Preferences:
     """Points at scale 1."""
     in_degrees: bool = setting(True)
     """Whether angles are shown in degrees instead of radians."""
-    quality: str = setting("final", choices=QUALITIES)
+    quality: Quality = setting("final", choices=QUALITIES)
     """Quality of the view."""
     samples: int = setting(4, choices=SAMPLES)
     """Samples per pixel."""

@@ -10,6 +10,7 @@ from collections.abc import Generator, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from imgui_bundle import imgui
@@ -44,7 +45,7 @@ from viewer.phrases import counted, printable
 from viewer.rendering.framing import frames_looked_at
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
-from viewer.rendering.options import QUALITIES, SIZE, DisplayOptions
+from viewer.rendering.options import QUALITIES, SIZE, DisplayOptions, Quality
 from viewer.rendering.overlay.annotation import Annotation, mark_annotation
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
@@ -65,7 +66,7 @@ _SIZES = {
     "1080x1920": "upright: 1080 x 1920",
     "own": "custom",
 }
-_LOOKS = {"": "as the view, but at most Normal for motions", **QUALITIES}
+_LOOKS = {"": "as the view, but at most Normal for motions"} | QUALITIES
 _SAMPLES = {"0": "as the view", "1": "1", "4": "4", "8": "8", "16": "16"}
 _BACKGROUNDS = {
     "": "as the view",
@@ -106,7 +107,7 @@ class RecordSettings:
     """Number of frames in a contact sheet."""
     quality: int = setting(int(QUALITY), limits=(0, 100))
     """Quality of the compression of videos."""
-    look: str = setting("", choices=_LOOKS)
+    look: Literal[""] | Quality = setting("", choices=_LOOKS)
     """Quality of the images."""
     samples: int = 0
     """Samples per pixel; 0 for those of the view."""

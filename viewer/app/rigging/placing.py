@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from viewer.app.core.state import AppState
@@ -10,7 +12,7 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.diagnostics import Diagnostic
 from viewer.rendering.camera import camera_axes
-from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rendering.passes.ghost_pass import Ghost, GhostStyle
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import nearest_rotations
@@ -140,12 +142,11 @@ def ghost_of(state: AppState) -> Ghost | None:
     view, template = state.of(Rigging), aligned_template(state)
     if template is None or view.target is None:
         return None
+    style: Literal[""] | GhostStyle = ""
     if view.tool == "landmarks":
         style = "solid"
     elif view.tool or placing_now(state) is not None:
         style = view.ghost or ("wireframe" if view.tool else "")
-    else:
-        style = ""
     if not style:
         return None
     posed_template(view, template)

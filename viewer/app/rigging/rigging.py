@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from viewer.errors import RigError
 from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.phrases import one_of, printable
-from viewer.rendering.passes.ghost_pass import Ghost
+from viewer.rendering.passes.ghost_pass import Ghost, GhostStyle
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.ray_hit import RayHit
@@ -41,7 +42,12 @@ TOOLS = {
     "landmarks": ("Landmarks", "click a point of the template, then the same point of the target"),
 }
 """Tools to align the template with the target by hand: label and tooltip."""
-GHOSTS = {"": "hidden", "translucent": "translucent", "wireframe": "wireframe", "solid": "solid"}
+GHOSTS: dict[Literal[""] | GhostStyle, str] = {
+    "": "hidden",
+    "translucent": "translucent",
+    "wireframe": "wireframe",
+    "solid": "solid",
+}
 """Styles in which the template is drawn, with their labels."""
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
@@ -170,8 +176,7 @@ class Rigging:
     """Settings of the controls."""
     placing: Placing | None = None
     """Placement of the template; None until it has been aligned or moved."""
-    ghost: str = "translucent"
-    """A key of ``GHOSTS``."""
+    ghost: Literal[""] | GhostStyle = "translucent"
     tool: str = ""
     """A key of ``TOOLS``."""
     holds_mouse: bool = False

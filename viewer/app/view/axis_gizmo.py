@@ -14,7 +14,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect
 from viewer.app.view.camera_panel import fly_to
 from viewer.data_classes import dataclass
-from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
+from viewer.rendering.camera import VIEWS, NamedView, camera_axes, look_from, orbit
 
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
@@ -181,7 +181,7 @@ def _end_at(state: AppState, place: tuple[float, float]) -> _End | None:
     return max(near, key=lambda end: end.depth, default=None)
 
 
-def _named(state: AppState, end: _End) -> str:
+def _named(state: AppState, end: _End) -> NamedView:
     """Return the named view from an end; the opposite view if the camera is already there."""
     sides = {}
     for name in VIEWS:

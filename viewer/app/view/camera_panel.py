@@ -20,10 +20,10 @@ from viewer.app.core.widgets import (
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.phrases import printable
-from viewer.rendering.camera import VIEWS, front_azimuth, look_from
+from viewer.rendering.camera import VIEWS, NamedView, front_azimuth, look_from
 from viewer.rendering.camera_views import image_notes, lens_notes
 from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import Front, front_axes
+from viewer.rig.inspection.front import WantedFront, front_axes
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import actor_points
 
@@ -61,9 +61,11 @@ def draw(state: AppState) -> None:
         if button(state, name.capitalize()):
             look(state, name)
     up, ahead = state.scene.up, state.camera.front
-    texts = {axis: axis for axis in front_axes(up)}
-    now = next((axis for axis in texts if front_azimuth(axis, up) == ahead), "auto")
-    chosen = choice(state, "Front axis", now, {**texts, "auto": "automatic"})
+    fronts = front_axes(up)
+    now: WantedFront = next((axis for axis in fronts if front_azimuth(axis, up) == ahead), "auto")
+    texts: dict[WantedFront, str] = {axis: axis for axis in fronts}
+    texts["auto"] = "automatic"
+    chosen = choice(state, "Front axis", now, texts)
     explain("axis that the figures face, which defines the named views")
     if chosen != now:
         face(state, chosen)
@@ -120,21 +122,21 @@ def fit_actor(state: AppState) -> None:
         fly_from(state, before)
 
 
-def look(state: AppState, name: str) -> None:
+def look(state: AppState, name: NamedView) -> None:
     """Rotate the camera to a named view, and fit it to the scene."""
     state.camera.fixed = None
     look_from(state.camera, name)
     fit_again(state)
 
 
-def fly_to(state: AppState, name: str) -> None:
+def fly_to(state: AppState, name: NamedView) -> None:
     """Do the same as ``look``, but animate the camera for a fifth of a second."""
     before = state.camera.copy()
     look(state, name)
     fly_from(state, before)
 
 
-def face(state: AppState, front: Front) -> None:
+def face(state: AppState, front: WantedFront) -> None:
     """Set the axis that the figures face ("auto" estimates it), and rotate the camera with it."""
     state.set_front(front)
     fit_again(state)

@@ -45,13 +45,15 @@ from viewer.rendering.options import (
     BONES,
     OPACITIES,
     SHOWN,
+    Bones,
     Lights,
+    Shading,
     parse_color,
     skeleton_opacity,
 )
 from viewer.rendering.passes.ground_pass import grid_step
 from viewer.rig.annotations import BodyParts
-from viewer.rig.scene import scene_unit
+from viewer.rig.scene import Shown, scene_unit
 
 _BACKGROUNDS = {
     "gradient": "Gradient",
@@ -226,7 +228,12 @@ def _draw_background(state: AppState) -> None:
 
 def toggle_skeleton(state: AppState) -> None:
     """Show or hide the skeleton together with the skin."""
-    shown = {"skin": "both", "both": "skin", "skeleton": "skin", "binding": "skeleton"}
+    shown: dict[Shown, Shown] = {
+        "skin": "both",
+        "both": "skin",
+        "skeleton": "skin",
+        "binding": "skeleton",
+    }
     show(state, shown[state.options.show])
 
 
@@ -235,14 +242,14 @@ def toggle_binding(state: AppState) -> None:
     show(state, "skin" if state.options.show == "binding" else "binding")
 
 
-def show(state: AppState, what: str) -> None:
-    """Choose the visible parts, a key of ``SHOWN``, and show a status message."""
+def show(state: AppState, what: Shown) -> None:
+    """Choose the visible parts, and show a status message."""
     state.options.show = what
     state.say_status(SHOWN[what])
 
 
-def set_shading(state: AppState, name: str) -> None:
-    """Choose the shading, a key of ``SHADING_CHOICES``, and a scalar quantity if needed."""
+def set_shading(state: AppState, name: Shading) -> None:
+    """Choose the shading, and a scalar quantity if needed."""
     state.options.shading = name
     if name == "scalar":
         start_heat_map(state)
@@ -255,8 +262,8 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
     state.say_status(f"{text} {'on' if value else 'off'}")
 
 
-def show_bones(state: AppState, style: str) -> None:
-    """Choose the style of skeletons, a key of ``BONES``, and show a status message."""
+def show_bones(state: AppState, style: Bones) -> None:
+    """Choose the style of skeletons, and show a status message."""
     state.options.bones = style
     state.say_status(f"Bones: {BONES[style].lower()}")
 

@@ -29,7 +29,7 @@ from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
 from viewer.phrases import Shown, counted, listed
 from viewer.rig.file_record import Json, StoredImage, StoredTextures
-from viewer.rig.material import Outline, Rim
+from viewer.rig.material import Outline, OutlineMode, Rim
 
 MTOON = "VRMC_materials_mtoon"
 _SHADER = "VRM/MToon"
@@ -38,7 +38,7 @@ _UNLIT = "VRM/Unlit"
 _KEPT = (MTOON, "KHR_materials_unlit")
 _TOONY = 0.9
 _LARGEST = 1e4
-_MODES = {"worldCoordinates": "world", "screenCoordinates": "screen"}
+_MODES: dict[str, OutlineMode] = {"worldCoordinates": "world", "screenCoordinates": "screen"}
 _SLOTS = {
     "shade_texture": "shadeMultiplyTexture",
     "rim.texture": "rimMultiplyTexture",
@@ -152,9 +152,9 @@ def _rim(told: Json) -> Rim:
 
 def _outline(told: Json) -> Outline | None:
     """Return the outline; None if there is none."""
-    mode = _MODES.get(str(told.get("outlineWidthMode")), "")
+    mode = _MODES.get(str(told.get("outlineWidthMode")))
     width = value_of(told.get("outlineWidthFactor"), 0.0)
-    if not mode or width is None or width <= 0.0:
+    if mode is None or width is None or width <= 0.0:
         return None
     color = rows_of(told.get("outlineColorFactor"), (0.0, 0.0, 0.0))
     mix = value_of(told.get("outlineLightingMixFactor"), 1.0)

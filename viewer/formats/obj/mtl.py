@@ -33,7 +33,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, to_number
 from viewer.phrases import counted, listed, quoted
 from viewer.rig.arrays import Bytes
-from viewer.rig.material import Material, Texture
+from viewer.rig.material import AlphaMode, Material, Texture, Wrap
 
 _COLORS = {b"kd": "diffuse", b"ke": "emissive"}
 _NUMBERS = {b"pr": "roughness", b"pm": "metallic", b"d": "opacity", b"tr": "transparency"}
@@ -362,7 +362,7 @@ def _material(name: str, stated: _Statements, load: _Load) -> Material:
     }
     cut, numbers = textures.pop("opacity_texture", None), _numbers(stated, textures)
     opacity = _opacity(numbers)
-    alpha_mode = "blend" if opacity < 1.0 or cut is not None else "opaque"
+    alpha_mode: AlphaMode = "blend" if opacity < 1.0 or cut is not None else "opaque"
     if cut is not None and cut.image is not None:
         base = textures.get("base_texture")
         if base is not None and base.image is cut.image and cut.image[..., 3].min() == 255:
@@ -434,7 +434,7 @@ def _opacity(numbers: dict[str, tuple[float, ...]]) -> float:
 
 def _texture(options: _MapOptions, image: Bytes | None) -> Texture:
     """Return the texture of a map."""
-    wrap = "clamp" if options.clamps else "repeat"
+    wrap: Wrap = "clamp" if options.clamps else "repeat"
     return Texture(
         options.file,
         image,

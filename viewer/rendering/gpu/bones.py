@@ -18,6 +18,7 @@ from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.options import BoneStyle
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
@@ -59,7 +60,7 @@ class BoneBuffers:
     """
 
     def __init__(
-        self, context: moderngl.Context, skeleton: Skeleton, style: str, size: float
+        self, context: moderngl.Context, skeleton: Skeleton, style: BoneStyle, size: float
     ) -> None:
         links = _bone_links(skeleton, size)
         self._owner = Owner()

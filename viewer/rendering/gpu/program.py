@@ -9,9 +9,10 @@ import moderngl
 
 from viewer.errors import RenderError
 from viewer.interrupts import deferred
+from viewer.rendering.options import Shading
 from viewer.resources import resource
 
-SHADING = {
+SHADING: dict[Shading, str] = {
     "phong": "Blinn-Phong, two lights",
     "pbr": "Metallic-roughness, studio",
     "matcap": "Matcap (lit sphere)",
@@ -22,7 +23,7 @@ SHADING = {
 }
 """Chunks in ``shaders/shade`` and their labels in menus."""
 
-SHADING_CHOICES = {"auto": "Blinn-Phong, or by material", **SHADING}
+SHADING_CHOICES: dict[Shading, str] = {"auto": "Blinn-Phong, or by material", **SHADING}
 """Available shadings and their labels in menus."""
 
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")

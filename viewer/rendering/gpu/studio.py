@@ -7,6 +7,7 @@ import numpy as np
 
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import checked
+from viewer.rendering.options import Matcap
 from viewer.resources import resource
 
 STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
@@ -51,8 +52,8 @@ class Matcaps:
         self._context, self._owner = context, Owner()
         self._textures: dict[str, moderngl.Texture] = {}
 
-    def use(self, name: str) -> None:
-        """Bind a matcap, an entry of ``options.MATCAPS``."""
+    def use(self, name: Matcap) -> None:
+        """Bind a matcap."""
         if name not in self._textures:
             with np.load(resource("assets", "studio", "matcaps.npz")) as stored:
                 pixels = stored[name]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Literal, TypeAlias
 
 import moderngl
 
@@ -23,7 +24,7 @@ GHOST_COLOR = (0.10, 0.42, 0.85)
 
 _NEARER = (-2.0, -4.0)  # factor and units of the polygon offset
 
-STYLES = ("solid", "translucent", "wireframe")
+GhostStyle: TypeAlias = Literal["solid", "translucent", "wireframe"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,8 +35,7 @@ class Ghost:
     """Figure with a mesh, which is drawn unposed."""
     placement: Floats
     """(4, 4). Matrix from figure space to scene space."""
-    style: str = "translucent"
-    """One of ``STYLES``."""
+    style: GhostStyle = "translucent"
     color: Color = GHOST_COLOR
     """(r, g, b). Linear."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from viewer.rendering.gpu.draw_state import draw_nearest
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.options import Color, DisplayOptions, bone_style, skeleton_opacity
+from viewer.rendering.options import BoneStyle, Color, DisplayOptions, bone_style, skeleton_opacity
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -47,7 +47,7 @@ class SkeletonBuffers:
         self._bones: dict[str, BoneBuffers] = {}
         self._key: tuple[NumberKey, bool] | None = None
 
-    def style(self, options: DisplayOptions) -> str:
+    def style(self, options: DisplayOptions) -> BoneStyle:
         """Return the style of the drawn skeleton; see ``bone_style``."""
         return bone_style(self.figure.require_skeleton(), options)
 
@@ -55,7 +55,7 @@ class SkeletonBuffers:
         """Return the opacity of the skeleton over a skin."""
         return skeleton_opacity(self.figure.require_skeleton(), options)
 
-    def bones(self, style: str) -> BoneBuffers:
+    def bones(self, style: BoneStyle) -> BoneBuffers:
         """Return the shapes of a style other than boxes, created on first use."""
         if style not in self._bones:
             from viewer.rendering.gpu.bones import BoneBuffers

@@ -17,7 +17,7 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS, Surface
 from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
-from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.options import Color, DisplayOptions, Shading
 from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
@@ -236,7 +236,7 @@ class MeshPass:
         self._sorted.keep_only([])
 
 
-def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
+def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> Shading:
     """Return the shading of a mesh, a key of ``SHADING``."""
     # "auto" follows the materials, as does "scalar" if there are no values.
     if options.shading not in ("auto", "scalar"):

@@ -9,7 +9,7 @@ front.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -21,9 +21,11 @@ from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 
-Front: TypeAlias = str
+Front: TypeAlias = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 """A signed axis, such as ``"+z"``; never the up axis."""
-FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
+WantedFront: TypeAlias = Front | Literal["auto"]
+"""A front, or that it is estimated."""
+FRONTS: tuple[Front, ...] = ("+x", "-x", "+y", "-y", "+z", "-z")
 """All signed axes; the two along a scene's up axis do not apply to it."""
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
 _N_TIMES = 9  # number of sampled frames of a motion
