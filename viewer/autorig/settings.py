@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import Literal, TypeAlias
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 
-METHODS = {
+TransferMethod: TypeAlias = Literal["robust", "nearest"]
+METHODS: dict[TransferMethod, str] = {
     "robust": "closest surface points if they agree, other weights inpainted (Abdrashitov et al. "
     "2023)",
     "nearest": "aligned boxes, nearest vertices, joints copied (Tex-An Mesh)",
 }
 """Methods offered by menus and the command line."""
 
-JOINTS = ("surface", "alignment")
+JointPlaces: TypeAlias = Literal["surface", "alignment"]
+JOINTS: tuple[JointPlaces, ...] = ("surface", "alignment")
 """Placement of joints: by the surface around them, or only by the alignment."""
 
 
@@ -24,7 +27,7 @@ JOINTS = ("surface", "alignment")
 class TransferSettings:
     """Options of a rig transfer."""
 
-    method: str = setting(
+    method: TransferMethod = setting(
         "robust", "; ".join(f"{name}: {text}" for name, text in METHODS.items()), choices=METHODS
     )
     """All other options are for ``"robust"``."""
@@ -32,7 +35,7 @@ class TransferSettings:
     """Known facts about the alignment."""
     weights: WeightSettings = field(default_factory=WeightSettings)
     """Criteria for matching vertices, smoothing, and number of influences."""
-    joints: str = setting(
+    joints: JointPlaces = setting(
         "surface",
         "place joints by the surface around them, or only by the alignment (default: {default})",
         choices=JOINTS,

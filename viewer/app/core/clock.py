@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import field
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 from viewer.data_classes import dataclass
 from viewer.rig.motion.evaluation import pose_actors, scene_rate, time_span
@@ -12,7 +12,8 @@ from viewer.rig.motion.timing import DEFAULT_RATE, frame_at
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene
 
-MODES = {
+PlaybackMode: TypeAlias = Literal["loop", "once", "ping-pong", "run on"]
+MODES: dict[PlaybackMode, str] = {
     "loop": "Loop",
     "once": "Once",
     "ping-pong": "Ping-pong",
@@ -45,8 +46,7 @@ class Clock:
     """Whether time advances."""
     speed: float = 1.0
     """Seconds of motion per second, -4 to 4."""
-    mode: str = "loop"
-    """A key of ``MODES``."""
+    mode: PlaybackMode = "loop"
     start: float = 0.0
     end: float = 0.0
     """Playback range, seconds."""

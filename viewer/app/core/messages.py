@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import field
+from typing import Literal, TypeAlias
 
 from viewer.data_classes import dataclass
 
-KINDS = ("note", "status", "error")
+MessageKind: TypeAlias = Literal["note", "status", "error"]
 """Kinds of messages: unsolicited notes, status after a key or button, and errors."""
 
 _MOST = 1000  # maximum number of messages in the log
@@ -21,8 +22,7 @@ class Message:
 
     text: str
     """Text as shown."""
-    kind: str
-    """One of ``KINDS``."""
+    kind: MessageKind
     count: int = 1
     """Number of times it was shown."""
 
@@ -33,8 +33,8 @@ class MessageLog:
 
     _messages: dict[tuple[str, str], Message] = field(default_factory=dict)
 
-    def add(self, text: str, kind: str = "note") -> None:
-        """Add a message of a kind in ``KINDS``; a repeated one is counted and moves to the end."""
+    def add(self, text: str, kind: MessageKind = "note") -> None:
+        """Add a message; a repeated one is counted and moves to the end."""
         message = self._messages.pop((kind, text), None)
         if message is None:
             message = Message(text, kind, 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Iterator
+from typing import Literal, TypeAlias
 
 from imgui_bundle import imgui
 
@@ -60,12 +61,13 @@ _USES = {
     "mark": ("check_mark", "tab_selected_overline"),
 }
 Color = tuple[float, float, float, float]
+Theme: TypeAlias = Literal["dark", "light"]
 WARNING: Color = (1.0, 0.77, 0.30, 1.0)
 ERROR: Color = (1.0, 0.50, 0.42, 1.0)
 _DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a light panel
 
 
-def apply_theme(scale: float, theme: str = "dark") -> None:
+def apply_theme(scale: float, theme: Theme = "dark") -> None:
     """Set up font, style and behaviour of the current ImGui context."""
     font = interface_font()
     if font is not None:
@@ -109,8 +111,8 @@ def change_scale(old: float, new: float) -> None:
     style.font_scale_dpi = new
 
 
-def set_theme(theme: str) -> None:
-    """Set the colours of a theme, ``"dark"`` or ``"light"``."""
+def set_theme(theme: Theme) -> None:
+    """Set the colours of a theme."""
     style, row = imgui.get_style(), int(theme == "light")
     imgui.style_colors_light() if row else imgui.style_colors_dark()
     for use, names in _USES.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
-from viewer.app.posing.posed_joint import PosedJoint
+from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
@@ -65,7 +65,7 @@ def shifts(skeleton: Skeleton, joint: int) -> bool:
     return bool(skeleton.parents[joint] < 0) or len(translation_dofs(skeleton, joint)) > 0
 
 
-def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
+def arrows(joint: PosedJoint, orientation: Orientation) -> list[Arrow]:
     """Return the arrows of a joint, along the axes of an orientation or of its few DOFs."""
     if not shifts(joint.skeleton, joint.joint):
         return []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -13,6 +15,9 @@ from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton
+
+Orientation: TypeAlias = Literal["local", "parent", "world"]
+"""Whose axes the rings and arrows of a joint have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +63,7 @@ class PosedJoint:
         linear = self.parent_linear
         return unit(linear.T @ axis) * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
 
-    def axes(self, orientation: str) -> Floats:
+    def axes(self, orientation: Orientation) -> Floats:
         """Return an orientation's axes in the scene as the columns of a rotation (3, 3)."""
         if orientation == "world":
             return np.eye(3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 from imgui_bundle import imgui
@@ -15,6 +15,7 @@ from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files, save_in_background
+from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.export import ExportOptions, Part, Selection, export, files_written
@@ -29,7 +30,8 @@ from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, figure_pose
 
-TOOLS = {
+PoseTool: TypeAlias = Literal["select", "rotate", "move"]
+TOOLS: dict[PoseTool, tuple[str, str, str]] = {
     "select": ("Select", "Q", "click selects, drag orbits"),
     "rotate": ("Rotate", "E", "rotate the selected joint with its rings"),
     "move": (
@@ -39,7 +41,7 @@ TOOLS = {
     ),
 }
 """Tools: label of the button, key, tooltip."""
-ORIENTATIONS = {
+ORIENTATIONS: dict[Orientation, str] = {
     "local": "Local axes",
     "parent": "Parent axes",
     "world": "World axes",
@@ -113,10 +115,8 @@ class HeldVector:
 class Posing:
     """State of the tools and panels for posing."""
 
-    tool: str = "select"
-    """A key of ``TOOLS``."""
-    orientation: str = "local"
-    """A key of ``ORIENTATIONS``."""
+    tool: PoseTool = "select"
+    orientation: Orientation = "local"
     chain_length: int = 0
     """Number of joints above a dragged joint that may rotate; 0 for the default of two, excluding
     the root."""

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
-from viewer.app.posing.posed_joint import PosedJoint
+from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
@@ -48,8 +48,8 @@ class Ring:
     """DOF that it changes; -1 for the whole joint."""
 
 
-def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:
-    """Return the rings of a joint for a key of ``ORIENTATIONS``; none if it cannot rotate."""
+def rings(joint: PosedJoint, pose: Pose, orientation: Orientation, frame: ViewFrame) -> list[Ring]:
+    """Return the rings of a joint; none if it cannot rotate."""
     skeleton = joint.skeleton
     if rotates_freely(skeleton, joint.joint):
         axes = joint.axes(orientation)

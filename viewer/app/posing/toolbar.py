@@ -20,7 +20,15 @@ from viewer.app.core.widgets import (
 from viewer.app.curves.editing import key_present_pose
 from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
-from viewer.app.posing.posing import ORIENTATIONS, TOOLS, Posing, copy_pose, mirror, paste_pose
+from viewer.app.posing.posing import (
+    ORIENTATIONS,
+    TOOLS,
+    PoseTool,
+    Posing,
+    copy_pose,
+    mirror,
+    paste_pose,
+)
 from viewer.rig.posing.joint_rotation import rotates_freely, rotation_dofs
 from viewer.rig.skeleton import joint_label
 
@@ -131,8 +139,8 @@ def _draw_chain(state: AppState) -> None:
         state.of(Posing).chain_length = min(max(length, 1), longest)
 
 
-def choose_tool(state: AppState, tool: str) -> None:
-    """Choose a tool, a key of ``TOOLS``, and show a hint, or the reason why it is disabled."""
+def choose_tool(state: AppState, tool: PoseTool) -> None:
+    """Choose a tool, and show a hint, or the reason why it is disabled."""
     why = no_tool(state)
     if tool != "select" and why:
         state.say_status(f"{TOOLS[tool][0]}: {why}")

@@ -9,12 +9,13 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from typing import Literal
 
 from imgui_bundle import imgui
 
 from viewer.app.core.actions import Shortcut
 from viewer.app.core.state import AppState
-from viewer.app.core.theme import change_scale, set_theme
+from viewer.app.core.theme import Theme, change_scale, set_theme
 from viewer.app.core.widgets import KeyNames
 from viewer.app.files.files import Files
 from viewer.app.preferences.key_map import label_of
@@ -55,7 +56,7 @@ def chosen_scale(preferences: Preferences, appearance: Appearance) -> float:
     return appearance.given_scale or preferences.scale or appearance.screen_scale
 
 
-def chosen_theme(preferences: Preferences, appearance: Appearance) -> str:
+def chosen_theme(preferences: Preferences, appearance: Appearance) -> Theme:
     """Return the theme of the interface: the preferred one, or the system's."""
     if preferences.theme == "system":
         return appearance.system_theme or "dark"
@@ -83,8 +84,8 @@ def follow_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
         state.of(KeyNames).changed = {usual: name for usual, name in names.items() if name != usual}
 
 
-def system_theme() -> str:
-    """Return ``"dark"`` or ``"light"``; empty if it cannot be determined."""
+def system_theme() -> Literal[""] | Theme:
+    """Return the system's theme; empty if it cannot be determined."""
     if sys.platform == "win32":
         import winreg
 

@@ -6,23 +6,36 @@ import json
 from collections.abc import Callable
 from dataclasses import Field, asdict, field, fields
 from pathlib import Path
+from typing import Literal
 
 import platformdirs
 
+from viewer.app.core.theme import Theme
 from viewer.data_classes import dataclass, setting
 from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES, Quality
+from viewer.rig.geometry.vectors import SignedUp
 
 CAPTURED = "captured"
 """Value of ``Appearance.captured`` in the frame in which the key was pressed."""
-THEMES = {"dark": "Dark", "light": "Light", "system": "Follow the system"}
+THEMES: dict[Theme | Literal["system"], str] = {
+    "dark": "Dark",
+    "light": "Light",
+    "system": "Follow the system",
+}
 """Themes with their labels."""
 SCALES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
 """Scales of the interface that can be chosen."""
 SAMPLES = (1, 2, 4, 8, 16)
 """Samples per pixel that can be chosen."""
-UPS = {"": "detect from the bodies", "y": "y", "z": "z", "-y": "-y", "-z": "-z"}
+UPS: dict[Literal[""] | SignedUp, str] = {
+    "": "detect from the bodies",
+    "y": "y",
+    "z": "z",
+    "-y": "-y",
+    "-z": "-z",
+}
 """Up axes of captures and BVH files, with their labels."""
 
 
@@ -30,7 +43,7 @@ UPS = {"": "detect from the bodies", "y": "y", "z": "z", "-y": "-y", "-z": "-z"}
 class Preferences:
     """The user's preferences; the defaults are those of a new installation."""
 
-    theme: str = setting("dark", choices=THEMES)
+    theme: Theme | Literal["system"] = setting("dark", choices=THEMES)
     scale: float = setting(0.0, choices=(0.0, *SCALES))
     """Scale of the interface; 0 for that of the monitor."""
     font_size: float = setting(15.0, limits=(9.0, 36.0), unit="%.0f")
@@ -41,7 +54,7 @@ class Preferences:
     """Quality of the view."""
     samples: int = setting(4, choices=SAMPLES)
     """Samples per pixel."""
-    up: str = setting("", choices=UPS)
+    up: Literal[""] | SignedUp = setting("", choices=UPS)
     """Up axis of captures and BVH files."""
     keys: dict[str, str] = field(default_factory=dict)
     """Keys that differ from the default: maps names of actions to names of keys."""
@@ -59,9 +72,9 @@ class Appearance:
     """Scale of the interface that suits the monitor."""
     given_scale: float | None = None
     """Scale given on the command line, which takes precedence."""
-    system_theme: str = ""
-    """Theme of the system, ``"dark"`` or ``"light"``; empty if unknown."""
-    theme: str = "dark"
+    system_theme: Literal[""] | Theme = ""
+    """Theme of the system; empty if unknown."""
+    theme: Theme = "dark"
     """Theme that is applied."""
     scale: float = 1.0
     font_size: float = 15.0

@@ -62,7 +62,7 @@ from viewer.app.rigging.work import (
     start_run,
 )
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignedBy, Alignment, AlignmentSettings
 from viewer.autorig.settings import METHODS
 from viewer.errors import ViewerError
 from viewer.formats import MESHES
@@ -81,14 +81,14 @@ _GAP = 1.2  # distance of the template from other actors, relative to its width
 _FEWEST = 3  # minimum number of landmarks
 _DOUBTFUL = 0.03  # error relative to the target's size, as in the report
 _STRETCHED = "stretched, pose kept"
-_METHODS = {
+_METHODS: dict[AlignedBy, str] = {
     "in place": "about the shared origin",
     "search": "by closest points",
     "fit": "pose and limbs fitted",
     "landmarks": "by landmarks",
     "given": "by hand",
 }
-"""Labels of the alignment methods, the values of ``Alignment.how``."""
+"""Labels of the alignment methods."""
 _POSES = "; joints are rotated and limbs resized if that fits much better"
 _FITS = (
     "; joints are rotated and limbs resized, or the whole template is stretched, if that fits much "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings, TemplateScale
 from viewer.autorig.correspondence import MAX_ANGLE
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
+from viewer.autorig.settings import JOINTS, METHODS, JointPlaces, TransferMethod, TransferSettings
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
@@ -34,7 +34,8 @@ from viewer.rig.scene import Actor, Motion, Scene
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import posed_mesh
 
-TOOLS = {
+RigTool: TypeAlias = Literal["", "move", "rotate", "scale", "landmarks"]
+TOOLS: dict[RigTool, tuple[str, str]] = {
     "": ("None", "the mouse orbits and selects as usual"),
     "move": ("Move", "drag the template by its arrows and squares"),
     "rotate": ("Rotate", "rotate the template with its rings"),
@@ -53,7 +54,7 @@ _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
 _USUAL = TransferSettings()
 _AXES = {"": "automatic", **{axis: axis for axis in AXES}}
-_SCALES = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
+_SCALES: dict[TemplateScale, str] = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 _posed: Memo[Skin, Mesh] = Memo()
 
 
@@ -107,8 +108,8 @@ class Landmark:
 class Result:
     """A target that was rigged."""
 
-    method: str
-    """A key of ``METHODS``."""
+    method: TransferMethod
+    """Method of the transfer."""
     rigged: Rigged
     """Result of the transfer."""
     actor: Actor
@@ -146,11 +147,11 @@ class RigChoices:
     up: str = setting("", choices=_AXES)
     facing: str = setting("", choices=_AXES)
     """Up and forward axes of the target; empty to search for them."""
-    scale: str = setting(_USUAL.alignment.scale, choices=_SCALES)
+    scale: TemplateScale = setting(_USUAL.alignment.scale, choices=_SCALES)
     refines: bool = setting(_USUAL.alignment.refines)
     fits: bool = setting(_USUAL.fits)
-    method: str = setting(_USUAL.method, choices={name: name for name in METHODS})
-    joints: str = setting(_USUAL.joints, choices={name: name for name in JOINTS})
+    method: TransferMethod = setting(_USUAL.method, choices={name: name for name in METHODS})
+    joints: JointPlaces = setting(_USUAL.joints, choices={name: name for name in JOINTS})
     max_distance: float = _USUAL.weights.match.max_distance
     max_angle: float = MAX_ANGLE
     """In degrees; the others are those of ``TransferSettings``."""
@@ -177,8 +178,7 @@ class Rigging:
     placing: Placing | None = None
     """Placement of the template; None until it has been aligned or moved."""
     ghost: Literal[""] | GhostStyle = "translucent"
-    tool: str = ""
-    """A key of ``TOOLS``."""
+    tool: RigTool = ""
     holds_mouse: bool = False
     """Whether the pointer is on a handle of the gizmo, or holds one."""
     scaling: tuple[float, float] | None = None

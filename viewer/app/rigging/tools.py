@@ -30,7 +30,15 @@ from viewer.app.rigging.placing import (
     similarity_now,
     target_place,
 )
-from viewer.app.rigging.rigging import TOOLS, Landmark, Rigging, Template, refresh, target_mesh
+from viewer.app.rigging.rigging import (
+    TOOLS,
+    Landmark,
+    Rigging,
+    RigTool,
+    Template,
+    refresh,
+    target_mesh,
+)
 from viewer.app.rigging.work import finish_work, start_align, start_reading
 from viewer.app.view.hovering import Picking
 from viewer.rendering.passes.ghost_pass import Ghost
@@ -53,8 +61,8 @@ _LEAST = 0.02  # minimum factor: dragging to the centre must not make the templa
 _INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
-def choose_rig_tool(state: AppState, tool: str) -> None:
-    """Choose a tool to move the template, a key of ``TOOLS``."""
+def choose_rig_tool(state: AppState, tool: RigTool) -> None:
+    """Choose a tool to move the template."""
     view = state.of(Rigging)
     if tool and aligned_template(state) is None:
         start_reading(state)

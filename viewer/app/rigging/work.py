@@ -36,7 +36,7 @@ from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import METHODS, TransferSettings
+from viewer.autorig.settings import METHODS, TransferMethod, TransferSettings
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
@@ -235,7 +235,7 @@ def start_match(state: AppState) -> None:
     _begin(state, "Finding closest points", act)
 
 
-def start_run(state: AppState, methods: tuple[str, ...]) -> None:
+def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
     """Rig the target by some methods, and show the first result; align the template if needed."""
     target, choices, placing = (
         state.of(Rigging).target,
@@ -344,7 +344,7 @@ def _match_settings(choices: RigChoices) -> MatchSettings:
 
 
 def _transfer_settings(
-    choices: RigChoices, method: str, placing: Placing | None
+    choices: RigChoices, method: TransferMethod, placing: Placing | None
 ) -> TransferSettings:
     """Return the settings to transfer the rig of a template placed so, or not at all (None)."""
     alignment = AlignmentSettings()

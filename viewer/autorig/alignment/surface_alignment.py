@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -27,7 +28,9 @@ from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats, Ints, freeze_fields
 
-SCALES = ("uniform", "axes", "none")
+AlignedBy: TypeAlias = Literal["in place", "search", "landmarks", "given", "fit"]
+TemplateScale: TypeAlias = Literal["uniform", "axes", "none"]
+SCALES: tuple[TemplateScale, ...] = ("uniform", "axes", "none")
 """One common scale, one scale along each axis of the target, or the template's size unchanged."""
 
 SAMPLES = 2_000
@@ -65,7 +68,7 @@ class AlignmentSettings:
 
     up: str | None = setting(None, "up axis of the target (default: estimated)")
     facing: str | None = setting(None, "front of the target (default: estimated)")
-    scale: str = setting(
+    scale: TemplateScale = setting(
         "uniform",
         "scale of the template: one factor, one factor per axis, or none (default: {default})",
         choices=SCALES,
@@ -113,12 +116,11 @@ class Alignment:
     """RMS distances over the size in the same two directions, without the median offset between the
     surfaces. All distances are included, each clamped to 5 %, so that protruding ends of limbs
     are included."""
-    how: str
-    """``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` if pose and
-    proportions were also fitted, unless landmarks were given."""
+    how: AlignedBy
+    """``"fit"`` if pose and proportions were also fitted, unless landmarks were given."""
 
     @classmethod
-    def of(cls, template: Side, target: Side, similarity: Similarity, how: str) -> Alignment:
+    def of(cls, template: Side, target: Side, similarity: Similarity, how: AlignedBy) -> Alignment:
         """Return an alignment together with its errors."""
         size = target.size
         gaps = gaps_between(template, target, similarity)
@@ -234,7 +236,7 @@ def _is_rotation(linear: Floats) -> bool:
     return bool(np.abs(linear @ linear.T - np.eye(3)).max() <= 1e-6)
 
 
-_HOW = {
+_HOW: dict[AlignedBy, str] = {
     "in place": "the template is scaled and rotated about the shared origin",
     "search": "found by matching closest points",
     "landmarks": "from the landmarks",

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 import numpy as np
 
 from viewer.rig.arrays import Floats
 
 # Smaller determinants, of matrices scaled to entries up to 1, have an unreliable sign.
 _FLAT = 1e-5
+
+Up: TypeAlias = Literal["y", "z"]
+"""Axis that points up in a figure or scene."""
+SignedUp: TypeAlias = Literal["y", "z", "-y", "-z"]
+"""Axis that points up in the world of a file."""
 
 
 def unit(vectors: Floats) -> Floats:
