@@ -86,6 +86,37 @@ def test_loss_of_repeating_curves_is_reported(tmp_path, mode):
     assert between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
 
 
+def test_curve_that_repeats_too_often_is_an_estimate(tmp_path):
+    """Of 20,000 repetitions in 40 s, whose keys are 1 ms apart, only some can be compared."""
+    actor = swinging(("constant", "cycle"), 40.0, (0.0, 0.001, 0.002))
+    note = error_between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh"))
+    assert note.values["estimate"].sentence == "an estimate from {n}"
+
+
+def test_peak_at_the_end_of_a_likely_span_is_refined(tmp_path, monkeypatch):
+    """A curve from 0 to 1 in half a second, slopes 4 and -0.2, is 2 u - 0.9 u^2 - 0.1 u^3.
+
+    Its maximum, where 2 - 1.8 u - 0.3 u^2 = 0, is just before the key. The next likely span is ten
+    seconds later.
+    """
+    errors = "viewer.export._losses.motion_errors"
+    monkeypatch.setattr(f"{errors}._MOST", 14)  # as many as spans: 7 steps for each likely one
+    monkeypatch.setattr(f"{errors}._LIKELY", 2)
+    actor = swinging(end=12.0)
+    times = np.array([0.0, 0.5, 1.0, 10.0, 10.5, 11.0])
+    values = np.array([0.0, 1.0, 0.0, 0.0, 0.9, 0.0])
+    slopes = ((0.0, 4.0), (-0.2, -0.2), (0.0, 0.0), (0.0, 3.6), (-0.18, -0.18), (0.0, 0.0))
+    channels = list(actor.clip.channels)
+    channels[5] = Channel(5, times, values, slopes)
+    actor = Actor(actor.figure, clip=replace(actor.clip, channels=tuple(channels)))
+    note = error_between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh"))
+    u = (np.sqrt(1.8**2 + 4.0 * 0.3 * 2.0) - 1.8) / 0.6
+    largest = 2.0 * u - 0.9 * u**2 - 0.1 * u**3
+    assert note.values["estimate"] != ""
+    found = note.values["joint"].values["distance"]
+    assert found == pytest.approx(2.0 * np.sin(0.5 * largest), rel=1e-6)
+
+
 def test_vertex_loss_between_frames_is_reported(tmp_path):
     """The vertex is three metres away from the rotating joint that it follows."""
     actor = swinging()
