@@ -61,6 +61,7 @@ from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
 from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import Remedy, agree, all_of, counted, printable
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range, upright_single_frame
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
@@ -277,7 +278,7 @@ class _Request:
     scene: Scene
     warnings: list[str | Diagnostic]
     span: tuple[int, int]
-    up: str
+    up: SignedUp
 
     @property
     def actor(self) -> Actor:

@@ -21,6 +21,7 @@ from viewer.diagnostics import described
 from viewer.diagnostics.record import JsonObject, note_values
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import Mesh, bounding_box, box_size, flat_triangles
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose, rest_pose
@@ -91,7 +92,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> JsonObject:
     }
 
 
-def _describe_actor(actor: Actor, up: str) -> JsonObject:
+def _describe_actor(actor: Actor, up: Up) -> JsonObject:
     """Return the description of an actor; its box is in world space, with up axis ``up``."""
     figure = actor.figure
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))

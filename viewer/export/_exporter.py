@@ -13,6 +13,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Bools
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
@@ -97,8 +98,8 @@ class Part:
     """Animations that keep their own keys; the figure is then at rest."""
     frames: SampledAnimation | SampledPoints | SampledParts | None = None
     """A motion at a rate."""
-    up: str = "y"
-    """"y", "z", "-y" or "-z": up axis of the frames; negative for those that keep their world."""
+    up: SignedUp = "y"
+    """Up axis of the frames; negative for those that keep their world."""
 
     @property
     def content(self) -> Content:

@@ -17,6 +17,7 @@ from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
 from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
@@ -87,7 +88,7 @@ def check_unit(options: ExportOptions, title: str) -> None:
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
-def up_axis(options: ExportOptions) -> str:
+def up_axis(options: ExportOptions) -> SignedUp:
     """Return the up axis of the file, y or z: the requested one, else that of the scene."""
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
@@ -251,7 +252,7 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     return rotated_frames(figure, found, rotation_vector_to_quaternion(back))
 
 
-def _quarter_turn(up: str) -> Floats:
+def _quarter_turn(up: SignedUp) -> Floats:
     """Return the rotation vector about x from the other up axis, y or z, to ``up``."""
     return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 

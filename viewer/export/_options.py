@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import Literal
 
 from viewer.data_classes import dataclass, setting
+from viewer.rig.geometry.vectors import SignedUp, Up
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 
@@ -67,7 +69,7 @@ class ExportOptions:
     unit: str = setting(
         "", "unit of the file (default: cm in BVH)", flag="--to-unit", choices=METRES
     )
-    up: str = setting(
+    up: Literal[""] | Up = setting(
         "",
         "up axis of the file (default: y in BVH, z in SMPL-X)",
         flag="--to-up",
@@ -87,9 +89,8 @@ class ExportOptions:
         6, "BVH: decimals, 1 to 15 (default: {default})", limits=(1, 15), read=int, metavar="N"
     )
     safe_names: bool = setting(False, f"BVH: {SAFE_NAMES}")
-    world_up: str = "y"
-    """One of "y", "z", "-y" or "-z": the up axis of the animation's world; negative axes are only
-    for exporters that keep that world."""
+    world_up: SignedUp = "y"
+    """Up axis of the animation's world; negative only for exporters that keep that world."""
     skinning: Skinning = field(default_factory=Skinning)
     """Skinning method and options, if vertices are written."""
     optimizes: bool = setting(

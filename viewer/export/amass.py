@@ -37,9 +37,10 @@ from viewer.phrases import counted
 from viewer.rig.arrays import Arrays
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
-Layout = Callable[[FamilyFrames, slice, float, str], Arrays]
+Layout = Callable[[FamilyFrames, slice, float, SignedUp], Arrays]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""
 FEWEST = 16
 """Minimum number of shape coefficients, as readers of AMASS require."""
@@ -115,7 +116,7 @@ def write_layout(
     ]
 
 
-def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> Arrays:
+def _arrays(body: FamilyFrames, part: slice, rate: float, up: SignedUp) -> Arrays:
     shape = padded(body.shape, FEWEST)
     vectors = body.vectors[part]
     arrays: Arrays = {

@@ -39,6 +39,7 @@ from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.evaluation import pose_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
 from viewer.rig.posing.pose_vector import write_vector
@@ -195,7 +196,7 @@ def _export_points(
     ]
 
 
-def _turn(up: str) -> Floats:
+def _turn(up: SignedUp) -> Floats:
     """Return the rotation vector from the other up axis, y or z, to ``up``."""
     return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 

@@ -6,7 +6,6 @@ Convex polygons become fans; others are triangulated by ear clipping.
 from __future__ import annotations
 
 import re
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from viewer.formats._source import Source
 from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.units import UNIT_NAMES
 
@@ -208,7 +208,7 @@ def polygon_text(counts: NDArray[np.integer], n_triangles: int) -> str:
     return f"{', '.join(parts)}: {counted(n_triangles, 'triangle')} in all"
 
 
-def stated_up(comment: str) -> Literal["y", "z"]:
+def stated_up(comment: str) -> Up:
     """Return the up axis stated by a comment that this program wrote; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 

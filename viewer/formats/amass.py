@@ -40,6 +40,7 @@ from viewer.formats._source import Source
 from viewer.phrases import counted, listed, one_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
+from viewer.rig.geometry.vectors import SIGNED_UPS, StatedUp
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 
@@ -366,10 +367,11 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
     return rows
 
 
-def _up(archive: Archive, is_aist: bool) -> str:
+def _up(archive: Archive, is_aist: bool) -> StatedUp:
     said = archive.plain_text("up")
-    if said in ("y", "z", "-y", "-z"):
-        return said
+    for axis in SIGNED_UPS:
+        if axis == said:
+            return axis
     if is_aist:
         return "y"
     # EMAGE is y up, although its files do not state it.

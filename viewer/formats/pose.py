@@ -57,6 +57,7 @@ from viewer.phrases import axes, listed, optional, printable, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
 from viewer.rig.retargeting.pose_transfer import JointRotations
@@ -100,7 +101,7 @@ _NOT_NEEDED = (*GENDERS, *MODELS, *RATES, *_BESIDES.split())
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 
-_UPS = ("y", "z")  # axes that may be up
+_UPS: dict[str, Up] = {"y": "y", "z": "z"}  # axes that may be up
 _SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
 _LONGEST_WORD = 200  # maximum number of characters of a text
 _MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
@@ -336,12 +337,13 @@ def _read_rotations(named: _NamedValues) -> JointRotations | None:
         )
     names = tuple(listed_names.tolist())
     turns = _quaternions(named, "joint_turns", names)
-    up = _word(named, "up", "y")
-    if up not in _UPS:
+    word = _word(named, "up", "y")
+    up = _UPS.get(word)
+    if up is None:
         raise named.fault(
             'F002.pose-up: up: expected "y" or "z", found {found}',
             "up",
-            found=quoted(printable(up, 20)),
+            found=quoted(printable(word, 20)),
         )
     rotations = values.get("joint_rotations")
     shifts, scales = values.get("joint_shifts"), values.get("joint_scales")

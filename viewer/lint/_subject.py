@@ -28,7 +28,7 @@ from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform, mean_scale
-from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
@@ -70,7 +70,7 @@ class Subject:
     """The actor, which is not modified."""
     index: int = 0
     """Index of the actor in its scene."""
-    up: Literal["y", "z"] = "y"
+    up: Up = "y"
     """The scene's up axis."""
     options: LintOptions = field(default_factory=LintOptions)
     """Thresholds of the checks."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, parameter_clip
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rate
@@ -68,7 +68,7 @@ class Builder:
     """Unit of the scene, to which later people are scaled; empty if it is unknown."""
     views: tuple[CameraView, ...] = ()
     """Its cameras, in metres, before placement."""
-    up: Literal["y", "z"] = "y"
+    up: Up = "y"
     """The axis along which people stand before placement."""
     n_read: int = 0
     """Number of frames already added."""

@@ -137,7 +137,7 @@ def _give_body_motion(
         body = with_joints(body, _known_joints(motion.joint_names, driven, settings))
     actor, notes = _moved(path, body, motion, draft)
     actor.shape_space = models.wanted(motion.shape_space)
-    up = settings.up or motion.up
+    up: str = settings.up or motion.up
     if not up:
         up = _judged_up(path, [actor], draft)
     if up.startswith("-"):
@@ -272,7 +272,7 @@ def _begin_capture(path: Path, capture: Capture, draft: SceneDraft, models: Body
     body = choice.figure
     if members and driven and choice.is_bundled:
         body = with_joints(body, _known_joints(members[0].names, driven, settings))
-    up = settings.up or capture.up
+    up: str = settings.up or capture.up
     while True:
         builder = Builder(
             capture,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass, setting
 from viewer.rig.bodies.smpl_family import GENDERS
+from viewer.rig.geometry.vectors import SIGNED_UPS, StatedUp
 from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class MotionSettings:
     lod: str = setting("", "level of detail of MHR, 0 (fine) to 6 (coarse)", metavar="N")
     frame_rate: float | None = None
     """Frames per second; None for the file's own, or 30 if it has none."""
-    up: str = setting("", "up axis of captures and BVH files", choices=("y", "z", "-y", "-z"))
+    up: StatedUp = setting("", "up axis of captures and BVH files", choices=SIGNED_UPS)
     """Empty to detect it from the bodies."""
     unit: str = setting("", "length unit of BVH files (default: estimated)", choices=METRES)
     """Lengths are converted from it to metres."""

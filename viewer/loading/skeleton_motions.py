@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from viewer.phrases import Remedy
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.animation_choice import chosen_animation
 from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -106,7 +107,7 @@ def as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion
     if settings.unit:
         motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as requested")
     if settings.up:
-        up: Literal["y", "z"] = "z" if settings.up.endswith("z") else "y"
+        up: Up = "z" if settings.up.endswith("z") else "y"
         motion = replace(motion, figure=replace(motion.figure, up=up), up_notes=())
     if settings.frame_rate is not None:
         timing = replace(motion.clip.timing, frame_rate=settings.frame_rate)

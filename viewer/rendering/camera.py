@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import bounding_box, box_size
 
 with warnings.catch_warnings():
@@ -57,8 +58,8 @@ class Camera:
     """Vertical field of view, degrees."""
     orthographic: bool = False
     """Whether the projection is parallel, with the same height at the target."""
-    up: Literal["y", "z"] = "y"
-    """Either "y" or "z". The scene's up axis."""
+    up: Up = "y"
+    """The scene's up axis."""
     fixed: CameraView | None = None
     """A calibrated camera to look through. It provides the matrices; the other fields have an
     effect only while this field is None."""
@@ -157,7 +158,7 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     return right, up, backward
 
 
-def front_azimuth(front: Front, up: Literal["y", "z"]) -> float:
+def front_azimuth(front: Front, up: Up) -> float:
     """Return the azimuth, in degrees, of a camera that looks straight at a front such as ``"+x"``.
 
     >>> front_azimuth("+z", "y"), front_azimuth("+x", "z"), front_azimuth("-z", "y")
@@ -170,7 +171,7 @@ def front_azimuth(front: Front, up: Literal["y", "z"]) -> float:
     return 0.0 if ahead > 0.0 else 180.0
 
 
-def facing_camera(front: Front, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
+def facing_camera(front: Front, up: Up, orthographic: bool = False) -> Camera:
     """Return a camera that views a front from slightly left and above, without framing anything."""
     ahead = front_azimuth(front, up)
     azimuth = _wrapped(ahead + _USUAL_AZIMUTH)
@@ -196,7 +197,7 @@ def eye(camera: Camera) -> Floats:
 def camera_from_view(
     view: CameraView,
     size: tuple[int, int],
-    up: Literal["y", "z"],
+    up: Up,
     box: Floats | None = None,
     seen: CameraView | None = None,
 ) -> Camera:

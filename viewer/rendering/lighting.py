@@ -16,6 +16,7 @@ from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import Effects, Shadow, View, key_direction
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import bounding_box, box_size
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Lighting:
 
         return self._owner.keep(GroundShadowPass(self.context, self.programs))
 
-    def begin(self, casters: Casters, up: str, box: Floats) -> None:
+    def begin(self, casters: Casters, up: Up, box: Floats) -> None:
         """Draw the maps shared by all passes; the box, (2, 3), stands on the ground."""
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
@@ -141,7 +142,7 @@ class Lighting:
                 item.release()
 
 
-def _ground(up: str, box: Floats) -> tuple[Floats, float]:
+def _ground(up: Up, box: Floats) -> tuple[Floats, float]:
     """Return the ground's two axes and the up axis as rows, and its height."""
     axes = ground_axes(up)
     return axes, float((axes[2] @ box.T).min())

@@ -12,6 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.bodies.smpl_family import ShapeSpace
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
@@ -70,8 +71,8 @@ class Figure:
     """Without a skeleton, the mesh stays in the bind pose."""
     skin: Skin | None = None
     """Without a skin, the mesh does not follow the skeleton."""
-    up: Literal["y", "z"] = "y"
-    """Either "y" or "z". Up axis of the file, which the camera follows."""
+    up: Up = "y"
+    """Up axis of the file, which the camera follows."""
     unit: str = ""
     """Unit of length, a key of ``viewer.rig.units.METRES``, given by the file or estimated; empty
     if unknown."""

@@ -16,6 +16,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped_skeleton
@@ -193,8 +194,8 @@ class Scene:
     """In drawing order."""
     diagnostics: tuple[Diagnostic, ...] = ()
     """Findings of the readers."""
-    world_up: Literal["y", "z"] | None = None
-    """One of "y", "z" or None. Up axis; None for the up axis of the first figure."""
+    world_up: Up | None = None
+    """Up axis; None for the up axis of the first figure."""
     views: tuple[CameraView, ...] = ()
     """Calibrated cameras of a capture."""
     facts: tuple[tuple[str, str], ...] = ()
@@ -224,8 +225,8 @@ class Scene:
         return self.actors[0].title if self.actors else ""
 
     @property
-    def up(self) -> Literal["y", "z"]:
-        """Up axis, ``"y"`` or ``"z"``."""
+    def up(self) -> Up:
+        """Up axis."""
         if self.world_up is not None:
             return self.world_up
         return self.actors[0].figure.up if self.actors else "y"

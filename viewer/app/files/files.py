@@ -34,6 +34,7 @@ from viewer.phrases import printable
 from viewer.progress import Cancelled, part_of_work, silent
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.captures.capture import CapturePart
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.pose import pose_key
@@ -64,7 +65,7 @@ class Files:
     """Body models that were found, by name; searched for when the menu opens."""
     model_folder: Path | None = None
     """Folder of body models; read when the window "Preferences" opens."""
-    up: str = ""
+    up: StatedUp = ""
     """Up axis of captures and BVH files that are opened; empty to detect it."""
     wake: Callable[[], None] = lambda: None
     """Called from other threads when a frame must be drawn."""

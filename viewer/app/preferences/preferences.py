@@ -6,16 +6,18 @@ import json
 from collections.abc import Callable
 from dataclasses import Field, asdict, field, fields
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import platformdirs
 
-from viewer.app.core.theme import Theme
 from viewer.data_classes import dataclass, setting
 from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES, Quality
-from viewer.rig.geometry.vectors import SignedUp
+
+if TYPE_CHECKING:
+    from viewer.app.core.theme import Theme
+    from viewer.rig.geometry.vectors import StatedUp
 
 CAPTURED = "captured"
 """Value of ``Appearance.captured`` in the frame in which the key was pressed."""
@@ -29,7 +31,7 @@ SCALES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
 """Scales of the interface that can be chosen."""
 SAMPLES = (1, 2, 4, 8, 16)
 """Samples per pixel that can be chosen."""
-UPS: dict[Literal[""] | SignedUp, str] = {
+UPS: dict[StatedUp, str] = {
     "": "detect from the bodies",
     "y": "y",
     "z": "z",
@@ -54,7 +56,7 @@ class Preferences:
     """Quality of the view."""
     samples: int = setting(4, choices=SAMPLES)
     """Samples per pixel."""
-    up: Literal[""] | SignedUp = setting("", choices=UPS)
+    up: StatedUp = setting("", choices=UPS)
     """Up axis of captures and BVH files."""
     keys: dict[str, str] = field(default_factory=dict)
     """Keys that differ from the default: maps names of actions to names of keys."""

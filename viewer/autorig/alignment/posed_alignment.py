@@ -34,6 +34,7 @@ from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import Mesh, volume
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
@@ -195,7 +196,7 @@ def _fitted(job: _Job, start: Alignment) -> PosedAlignment:
     )
 
 
-def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment:
+def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: Up) -> Alignment:
     """Return the template facing the other way, aligned with the target as well as possible."""
     similarity = rigid.similarity
     half = rotation_vector_to_matrix(np.pi * axis_direction(up))

@@ -13,6 +13,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose
 from viewer.rig.posing.pose_vector import rotation_rows
@@ -242,7 +243,7 @@ def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: f
     return result
 
 
-def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
+def leg_scale(before: Skeleton, after: Skeleton, up: Up, otherwise: float) -> float:
     """Return the ratio of two rest roots' heights above the feet; ``otherwise`` without legs."""
     # The root's height above the feet is roughly the leg length, and step length is proportional to
     # it. If limbs were scaled or the whole figure was stretched, root heights and translations

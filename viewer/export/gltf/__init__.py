@@ -48,6 +48,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
 from viewer.rig.geometry.transform import mean_scale
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene, scene_unit
@@ -321,7 +322,7 @@ def _quantization(path: Path, built: Built, figure: Figure) -> list[Diagnostic]:
     ]
 
 
-def _remarks(body: Body, up: str) -> list[Diagnostic]:
+def _remarks(body: Body, up: SignedUp) -> list[Diagnostic]:
     """Return notes about coordinate space and shape for users of the file."""
     figure, notes = body.figure, list[Diagnostic]()
     if up == "z":

@@ -19,6 +19,7 @@ from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import FileRecord, Json
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, skin_used
 
@@ -62,7 +63,7 @@ def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
 def add_body(
     document: Document,
     body: Body,
-    up: str,
+    up: SignedUp,
     pose: Pose | None,
     still: Locals | None,
     color: Color | None = None,

@@ -24,6 +24,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -68,7 +69,7 @@ def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
 def add_nodes(
     document: Document,
     name: str,
-    up: str,
+    up: SignedUp,
     unit: str,
     skeleton: Skeleton | None,
     pose: Pose | None,
@@ -103,7 +104,7 @@ def add_nodes(
     return Tree(root, place, joints, fixed)
 
 
-def _above(up: str, unit: str) -> Json:
+def _above(up: SignedUp, unit: str) -> Json:
     """Return the properties and name of the node above the whole figure; may be empty."""
     names, node = [], {}
     if up == "z":
@@ -115,7 +116,7 @@ def _above(up: str, unit: str) -> Json:
     return {"name": ", ".join(names), **node} if names else {}
 
 
-def to_metres(up: str, unit: str) -> Floats:
+def to_metres(up: SignedUp, unit: str) -> Floats:
     """Return the matrix of the node above the whole figure: (4, 4)."""
     matrix = np.diag([METRES.get(unit, 1.0)] * 3 + [1.0])
     if up == "z":

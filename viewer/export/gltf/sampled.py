@@ -22,6 +22,7 @@ from viewer.export.gltf.materials import Color
 from viewer.export.gltf.nodes import locals_of
 from viewer.export.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed
+from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import figure_pose
@@ -38,7 +39,7 @@ class Sampled:
     """Its frames, with gaps filled."""
     body: Body
     """The written form of its figure."""
-    up: str
+    up: SignedUp
     """Up axis of the frames."""
     color: Color | None = None
     """Linear colour of surfaces without a colour; None for the default."""

@@ -18,6 +18,7 @@ from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.file_record import Json, StoredTextures
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.material import Material
 from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
@@ -43,7 +44,7 @@ class NodeFile:
     animations: tuple[NodeAnimation, ...] = ()
     cameras: tuple[NodeCamera, ...] = ()
     """In file order; referred to by index."""
-    up: Literal["y", "z"] = "y"
+    up: Up = "y"
     """Up axis of the file."""
     unit: str = "m"
     """Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown."""

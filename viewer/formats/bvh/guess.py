@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from viewer.diagnostics import Phrase, wording
@@ -11,6 +9,7 @@ from viewer.formats._source import Source
 from viewer.phrases import Remedy, Shown, bare, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
@@ -110,7 +109,7 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
 
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
-) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
+) -> tuple[Up, Facts, tuple[Phrase, ...]]:
     """Return the up axis, facts and notes, from the rest pose (P, 3) and from the frames."""
     # Animals are longer than high; y is up if their legs then reach the ground. If the skeleton is
     # upright along another axis in the frames, that one is up, because some programs rotate the
@@ -131,13 +130,13 @@ def guess_up(
         return "y", (), ()
     joints = points[: skeleton.n_joints]
     rest = _axis(joints[upper].mean(axis=0) - joints[lower].mean(axis=0))
-    up: Literal["y", "z"] = "z" if rest == "+z" else "y"
+    up: Up = "z" if rest == "+z" else "y"
     every = examined_frames(clip.timing.n_frames) / clip.timing.frame_rate
     posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
     heights = posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)
     stands = _axis(heights.mean(axis=0))
     if stands in ("+y", "+z") and stands[1] != up:
-        other: Literal["y", "z"] = "z" if up == "y" else "y"
+        other: Up = "z" if up == "y" else "y"
         size = float(np.linalg.norm(heights, axis=1).mean())
         if rest in ("+y", "+z") and _lies(posed, other, up, size):
             note = Phrase(
@@ -162,7 +161,7 @@ def guess_up(
     return "y", (("up", "y, assumed"),), (note,) if rest else ()
 
 
-def _lies(posed: Floats, along: str, up: str, size: float) -> bool:
+def _lies(posed: Floats, along: str, up: Up, size: float) -> bool:
     """Return whether a body (F, J, 3), upright along one axis, lies in a world with another up."""
     # A standing body moves with its feet near 0 along its own axis. A lying one is near 0 along the
     # up axis, and anywhere along its own. Without a path there is no evidence, and people stand.

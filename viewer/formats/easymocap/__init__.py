@@ -66,6 +66,7 @@ from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.body_motion import BodyMotion
 
 _LEVELS = 3  # number of folders that may contain the cameras, from the folder of the frames upwards
@@ -80,7 +81,7 @@ class Options:
     flat_hands: bool | None = None
     """Whether hand components exclude the mean hand; if None, they do for SMPL-X and MANO, but not
     for SMPL+H."""
-    up: str = ""
+    up: StatedUp = ""
     """"y", "z", "-y" or "-z": up axis of the world; empty to estimate it from the people."""
     legacy_expression: bool = False
     """Whether expressions are the last of the shape coefficients, as in the legacy code."""

@@ -33,6 +33,7 @@ from viewer.formats.easymocap.files import (
 from viewer.phrases import one_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
 
@@ -332,7 +333,7 @@ class BodyRows(Rows):
         timing: Timing,
         flat_hands: bool | None,
         legacy_expression: bool,
-        up: str,
+        up: StatedUp,
     ) -> BodyMotion:
         """Return the rows as a motion; see ``BodyMotion`` for the meaning of the values."""
         layout, poses = self.layout, values["poses"]

@@ -23,6 +23,7 @@ from viewer.rig.captures.capture import Capture, CapturePart, RestRoots, capture
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.body_motion import BodyMotion, ParameterMotion
 from viewer.rig.motion.timing import Timing
 
@@ -38,7 +39,7 @@ class Options:
     """Frames per second; if None, the tool's rate, or 30 if it has none."""
     space: str = ""
     """"world" or "camera", in which the bodies are; empty for the world, if the file has it."""
-    up: str = ""
+    up: StatedUp = ""
     """"y", "z", "-y" or "-z": up axis of the space; empty for that of the tool."""
     average_shape: bool = False
     """Whether a shape that changes is replaced by its average."""
@@ -158,7 +159,7 @@ class Results:
     """The member of the SMPL family, or ``"MHR"``; empty if there are no bodies."""
     people: Mapping[str, Mapping[int, Track]]
     """By space, ``"world"`` or ``"camera"``; the first one of the file is the default."""
-    ups: Mapping[str, str]
+    ups: Mapping[str, StatedUp]
     """The axis that points up; empty if it is unknown."""
     cameras: Mapping[str, Cameras] = field(default_factory=dict)
     """Cameras, if the file determines them."""

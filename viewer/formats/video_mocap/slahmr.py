@@ -27,6 +27,7 @@ from viewer.formats.video_mocap.results import Cameras, Results, Track, moved
 from viewer.phrases import counted
 from viewer.rig.arrays import Bools
 from viewer.rig.bodies.smpl_family import members_by_numbers
+from viewer.rig.geometry.vectors import StatedUp
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
 _TRACKS = "track_info.json"
@@ -92,7 +93,7 @@ def read(source: Source, archive: Archive) -> Results:
                 "world": Cameras(np.arange(n_frames), matrix, turned, placed, size),
                 "camera": Cameras.still(matrix, size),
             }
-    ups = {"world": "-y", "camera": "-y"}
+    ups: dict[str, StatedUp] = {"world": "-y", "camera": "-y"}
     return Results("SLAHMR", "SMPL+H", spaces, ups, cameras, notes=notes)
 
 

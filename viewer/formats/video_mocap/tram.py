@@ -36,10 +36,14 @@ from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse,
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rig.geometry.vectors import SignedUp, StatedUp
 
 _TRACK = re.compile(r"hps_track_(\d{1,6})\.npy")
 _FOLDER, _CAMERA = "hps", "camera.npy"
-_POSES = (("world_cam_R", "world_cam_T", "y"), ("pred_cam_R", "pred_cam_T", "-y"))
+_POSES: tuple[tuple[str, str, SignedUp], ...] = (
+    ("world_cam_R", "world_cam_T", "y"),
+    ("pred_cam_R", "pred_cam_T", "-y"),
+)
 
 
 def recognises(archive: Archive) -> bool:
@@ -82,7 +86,8 @@ def _opened(camera: Source) -> Archive | None:
 
 def _results(people: dict[int, Archive], camera: Archive | None) -> Results:
     in_camera = {person: _track(archive) for person, archive in people.items()}
-    spaces, ups = {"camera": in_camera}, {"camera": "-y"}
+    spaces = {"camera": in_camera}
+    ups: dict[str, StatedUp] = {"camera": "-y"}
     cameras: dict[str, Cameras] = {}
     pose = _pose(camera)
     intrinsics = _intrinsics(camera, next(iter(people.values()), None))
@@ -128,7 +133,7 @@ def _track(archive: Archive) -> Track:
     )
 
 
-def _pose(camera: Archive | None) -> tuple[Floats, Floats, str] | None:
+def _pose(camera: Archive | None) -> tuple[Floats, Floats, SignedUp] | None:
     """Return rotations and translations from the camera to the world, and the world's up axis."""
     for turned, placed, up in _POSES:
         if camera is not None and has(camera, turned, placed):

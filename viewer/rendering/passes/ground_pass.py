@@ -13,6 +13,7 @@ from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import parse_color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import box_size
 
 _LINE_COLOR = (0.20, 0.25, 0.32)
@@ -76,7 +77,7 @@ class GroundPass:
                 item.release()
 
 
-def ground_axes(up: str) -> Floats:
+def ground_axes(up: Up) -> Floats:
     """Return the ground's two axes and the up axis as rows, right-handed: (3, 3)."""
     if up == "z":
         return np.eye(3)

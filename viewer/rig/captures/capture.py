@@ -10,6 +10,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.body_motion import BodyMotion, ParameterMotion
 from viewer.rig.motion.timing import DEFAULT_RATE
 
@@ -47,9 +48,8 @@ class Capture:
     parts: Callable[[], Iterator[CapturePart]]
     """Returns an iterator over the parts in time order; the first is short so that something can be
     shown early. Every call reads the files again."""
-    up: str = ""
-    """One of "y", "z", "-y", "-z" or "". The axis that points up in the world; empty to detect it
-    from the first bodies."""
+    up: StatedUp = ""
+    """The axis that points up in the world; empty to detect it from the first bodies."""
     views: tuple[CameraView, ...] = ()
     """Calibrated cameras."""
     model: str = ""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointLayout
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.sampled_animation import frame_range
 from viewer.rig.motion.upright import own_up
 from viewer.rig.scene import Actor, Scene
@@ -43,7 +42,7 @@ def sample_upright_points(
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
-) -> tuple[SampledPoints, Literal["y", "z"]]:
+) -> tuple[SampledPoints, Up]:
     """Return an actor's sampled points, rotated upright if upside down, and their up axis."""
     motion, layout = actor.clip, actor.figure.points
     if motion is None or motion.points is None or layout is None:

@@ -15,6 +15,12 @@ Up: TypeAlias = Literal["y", "z"]
 """Axis that points up in a figure or scene."""
 SignedUp: TypeAlias = Literal["y", "z", "-y", "-z"]
 """Axis that points up in the world of a file."""
+StatedUp: TypeAlias = Literal[""] | SignedUp
+"""The same; empty if it is unknown or not stated."""
+SIGNED_UPS: tuple[SignedUp, ...] = ("y", "z", "-y", "-z")
+"""All axes that may point up."""
+HANGING: dict[Up, SignedUp] = {"y": "-y", "z": "-z"}
+"""Opposite of each up axis."""
 
 
 def unit(vectors: Floats) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.scene import Actor, Scene
@@ -53,12 +53,12 @@ _MIRRORED = 0.98
 _LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
 
 
-def usual_front(up: str) -> Front:
+def usual_front(up: Up) -> Front:
     """Return the default front: +z if y is up, -y if z is up."""
     return "+z" if up == "y" else "-y"
 
 
-def front_axes(up: str) -> tuple[Front, ...]:
+def front_axes(up: Up) -> tuple[Front, ...]:
     """Return the four horizontal fronts for an up axis, as '+x' for "y"."""
     return tuple(front for front in FRONTS if front[1] != up)
 
@@ -76,7 +76,7 @@ def guess_front(scene: Scene) -> Front:
     return _nearest(sum(votes, np.zeros(3)) / max(len(votes), 1), scene.up)
 
 
-def _nearest(vote: Floats, up: str) -> Front:
+def _nearest(vote: Floats, up: Up) -> Front:
     """Return the axis closest to a vote; the default one if none is close."""
     fronts = front_axes(up)
     signs = [1.0 if front[0] == "+" else -1.0 for front in fronts]

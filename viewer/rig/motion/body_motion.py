@@ -20,6 +20,7 @@ from viewer.rig.coefficients import apply_coefficients, space_misfit, unused_coe
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.vectors import StatedUp
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
@@ -53,8 +54,8 @@ class BodyMotion:
     instead of finger joints."""
     flat_hands: bool = False
     """Whether ``hands`` are relative to the flat hand instead of the mean hand."""
-    up: str = ""
-    """One of "y", "z", "-y", "-z" or "". World up axis; empty if unknown."""
+    up: StatedUp = ""
+    """World up axis; empty if unknown."""
     shape_space: ShapeSpace = ShapeSpace()
     """Model and gender of the body, as stated by the file."""
     world_rotations: Floats | None = None

@@ -12,6 +12,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.vectors import HANGING, SignedUp
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_pose
 from viewer.rig.motion.evaluation import (
@@ -109,7 +110,7 @@ def upright_animation(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
     keeps_world: bool = False,
-) -> tuple[SampledAnimation, str]:
+) -> tuple[SampledAnimation, SignedUp]:
     """Sample an actor's clip, rotated upright if its world hangs, and the frames' up axis.
 
     Placement in the scene is ignored. An axis is negative only if ``keeps_world``.
@@ -119,7 +120,7 @@ def upright_animation(
     if not hangs:
         return animation, up
     if keeps_world:
-        return animation, f"-{up}"
+        return animation, HANGING[up]
     return replace(
         animation, frames=_rotated_upright(animation.figure, animation.frames), is_rotated=True
     ), up
@@ -192,10 +193,10 @@ def upright_single_frame(
     number: int = 0,
     time: float = 0.0,
     keeps_world: bool = False,
-) -> tuple[SampledAnimation, str]:
+) -> tuple[SampledAnimation, SignedUp]:
     """Return ``single_frame`` upright, and its up axis, as ``upright_animation`` does."""
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
-        return single_frame(actor, rate, number, time), f"-{up}" if hangs else up
+        return single_frame(actor, rate, number, time), HANGING[up] if hangs else up
     standing = replace(upright_actor(scene, actor), figure=actor.figure)
     return single_frame(standing, rate, number, time), up

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
@@ -32,7 +31,7 @@ _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
 _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
 
-def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
+def own_up(scene: Scene, actor: Actor) -> tuple[Up, bool]:
     """Return the actor's axis that placement maps to the scene's up, and whether it points down."""
     own = np.linalg.solve(actor.placement[:3, :3], axis_vector(scene.up))
     axis = int(np.abs(own).argmax())

@@ -23,7 +23,7 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.geometry.vectors import axis_vector, unit
+from viewer.rig.geometry.vectors import Up, axis_vector, unit
 from viewer.rig.hierarchy import path_to_root, with_ancestors
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_names import joint_meanings
@@ -127,12 +127,12 @@ def postures_of(motion: SkeletonMotion) -> Postures | None:
     return _postures(skeleton, motion.figure.up, rows, motion.clip.rotations[rows])
 
 
-def rest_posture(skeleton: Skeleton, up: str) -> Postures | None:
+def rest_posture(skeleton: Skeleton, up: Up) -> Postures | None:
     """Return the rest pose of a skeleton, with all DOFs at 0, as a single pose."""
     return _postures(skeleton, up, np.zeros(1, dtype=np.int32), skeleton.rest_rotations[None])
 
 
-def _postures(skeleton: Skeleton, up: str, rows: Ints, local: Floats) -> Postures | None:
+def _postures(skeleton: Skeleton, up: Up, rows: Ints, local: Floats) -> Postures | None:
     joints: dict[str, int] = {}
     for joint, name in enumerate(joint_meanings(skeleton)):
         if name:

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix, up_rotation
-from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.feet import feet_notes, plant_feet
@@ -64,7 +64,7 @@ def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
     return source, rest_of(figure.require_skeleton(), np.eye(3), figure.up).points
 
 
-def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Floats:
+def front_axes(points: Floats, matches: Matches, up: Up, is_source: bool) -> Floats:
     """Return left, up and forward of a body as rows (3, 3); left is x without known joints."""
     upward = axis_vector(up)
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))

@@ -33,7 +33,7 @@ from viewer.rig.geometry.rotation import (
     rotation_vector_to_matrix,
     up_rotation,
 )
-from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.kinematics import world_matrices, world_rotations
 from viewer.rig.pose import Pose, joint_rotations, zero_pose
 from viewer.rig.posing.joint_rotation import nearest_dofs
@@ -57,7 +57,7 @@ class JointRotations:
     w)."""
     shifts: Floats
     """(J, 3). Translations in addition to the DOFs, in the parent joint's frame."""
-    up: str
+    up: Up
     """The figure's up axis, ``"y"`` or ``"z"``."""
     layout: str
     """Result of ``dof_layout``: figures with the same layout use the DOF values directly."""
