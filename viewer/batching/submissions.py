@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, note, wording
@@ -405,7 +404,7 @@ class _Archive:
                 size=self.size,
             )
 
-    def _fault(self, key: str, **values: Any) -> FormatError:
+    def _fault(self, key: str, **values: object) -> FormatError:
         return FormatError(note(key, self.shown, **values))
 
 

@@ -19,7 +19,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.items import Item, Result
@@ -125,8 +125,8 @@ class _Context(SpawnContext):
         self,
         target: Callable[..., object],
         name: str,
-        args: tuple[Any, ...],
-        kwargs: dict[str, Any],
+        args: tuple[object, ...],
+        kwargs: dict[str, object],
     ) -> _Worker:
         """Return a worker."""
         worker = _Worker(target=target, name=name, args=args, kwargs=kwargs)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 
@@ -192,7 +191,7 @@ def _scene_members(record: FileRecord | None) -> Json:
     return {name: text_of(value) if name == "name" else value for name, value in scene.items()}
 
 
-def _merged_extras(given: list[tuple[str, Any]]) -> Any:
+def _merged_extras(given: list[tuple[str, object]]) -> object:
     """Return the application data of a file: that of all figures, or a list if these differ.
 
     >>> _merged_extras([("a", 1), ("b", 2), ("c", 1)])["sources"]
@@ -206,7 +205,7 @@ def _merged_extras(given: list[tuple[str, Any]]) -> Any:
         owners.setdefault(key, []).append(name)
     if len(values) == 1:
         return given[0][1]
-    merged: list[Any] = []
+    merged: list[Json] = []
     for key, extras in values.items():
         entry = {_FIGURES: owners[key], _EXTRAS: extras}
         # The lists of files that were already merged are joined.
@@ -214,7 +213,7 @@ def _merged_extras(given: list[tuple[str, Any]]) -> Any:
     return {_SOURCES: merged}
 
 
-def _listed(extras: object) -> list[Any]:
+def _listed(extras: object) -> list[Json]:
     """Return the entries of application data that was already merged; empty for other data."""
     entries = extras.get(_SOURCES) if isinstance(extras, dict) and len(extras) == 1 else None
     is_ours = isinstance(entries, list) and all(

@@ -38,7 +38,7 @@ class Document:
 
     def __init__(self, name: str) -> None:
         self.root: Json = {"asset": {"version": "2.0", "generator": "viewer"}}
-        self.extras: list[tuple[str, Any]] = []
+        self.extras: list[tuple[str, object]] = []
         """Name and application data of each figure whose file has some."""
         self.n_omitted = 0
         """Infinite and NaN values of the original files that ``glb`` or ``pair`` omitted."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -40,7 +39,7 @@ class Materials:
         self._images: dict[tuple[int, int], tuple[int, Bytes]] = {}
         self._added: dict[int, int] = {}
         self._textures: dict[tuple[int, int], int] = {}
-        self._samplers: dict[tuple[Any, ...], int] = {}
+        self._samplers: dict[tuple[object, ...], int] = {}
 
     @property
     def written(self) -> dict[int, int]:

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -323,7 +322,7 @@ def _add_made(
     return notes
 
 
-def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, Any]) -> None:
+def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, object]) -> None:
     """Add root extensions, and the constraints of nodes."""
     document.root["extensions"] = dict(extensions)
     document.declare(*extensions)
@@ -336,7 +335,7 @@ def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, 
         document.declare(_CONSTRAINT)
 
 
-def _written(data: Mapping[str, Any], extensions: Mapping[str, Any]) -> Diagnostic:
+def _written(data: Json, extensions: Mapping[str, object]) -> Diagnostic:
     """Return a note that counts the contents of the extensions."""
     bones = data["humanoid"]["humanBones"]
     n_expressions = sum(_size(part(data, "expressions", kind)) for kind in ("preset", "custom"))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 from viewer.export.gltf.body import Built
 from viewer.export.gltf.document import Document
@@ -67,7 +66,7 @@ def _character(data: Json, maps: Maps) -> Json:
     return result
 
 
-def _rows(data: object, name: str, found: Callable[[Any], int | None]) -> list[Any]:
+def _rows(data: object, name: str, found: Callable[[object], int | None]) -> list[Json]:
     """Return the objects of a list with translated indices, except those whose index is lost."""
     rows = data if isinstance(data, list) else []
     return [
@@ -77,7 +76,7 @@ def _rows(data: object, name: str, found: Callable[[Any], int | None]) -> list[A
     ]
 
 
-def _expression(data: object, maps: Maps) -> Any:
+def _expression(data: object, maps: Maps) -> object:
     if not isinstance(data, dict):
         return data
     result = dict(data)
@@ -90,7 +89,7 @@ def _expression(data: object, maps: Maps) -> Any:
 
 def _springs(data: Json, maps: Maps) -> Json:
     """Return the spring bones; chains with a lost joint are omitted as a whole."""
-    result, places, colliders = dict(data), dict[int, int](), list[Any]()
+    result, places, colliders = dict(data), dict[int, int](), list[Json]()
     for index, each in enumerate(list_in(data, "colliders")):
         node = maps.joint(part(each, "node"), "colliders")
         if node is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from viewer.export.gltf.body import Body, Built
 from viewer.rig.file_record import Json
@@ -53,7 +52,7 @@ def made_character(body: Body, built: Built, bones: Mapping[str, int], meta: Jso
     return data
 
 
-def _views(mesh: Mesh, built: Built) -> list[Any]:
+def _views(mesh: Mesh, built: Built) -> list[Json]:
     if not mesh.part_views:
         return []
     return [

@@ -32,7 +32,7 @@ _MOST_SETS = 3  # maximum number of texture coordinate sets that one figure's te
 _COLORS = ("base_texture", "emissive_texture", "shade_texture")  # sRGB
 # Toon materials have no metalness and roughness: their other textures use the units of these.
 _MATCAP, _RIM, _WIDTH = "metallic_texture", "roughness_texture", "occlusion_texture"
-_UNTEXTURED: dict[str, Any] = {
+_UNTEXTURED: dict[str, object] = {
     "u_textured": False,
     "u_has_metallic_map": False,
     "u_has_roughness_map": False,
@@ -49,7 +49,7 @@ class Surface:
 
     uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}, ()))
     """Uniforms of ``include/surface.glsl`` and ``shade/pbr.glsl``."""
-    untextured: dict[str, Any] = field(default_factory=dict)
+    untextured: dict[str, object] = field(default_factory=dict)
     """Uniforms that differ while textures are off."""
     textures: tuple[tuple[int, moderngl.Texture], ...] = ()
     """tuple of (unit, texture). Textures to bind before the triangles are drawn."""
@@ -175,12 +175,12 @@ def _slots(material: Material) -> dict[str, Texture]:
 
 def _uniforms(
     material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return all uniforms of a material, since programs keep the values of the previous one."""
     placed = _placed(material)
     channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
     slots = [sets.index(one.uv_set) if one.uv_set in sets else 0 for one in placed]
-    values: dict[str, Any] = {
+    values: dict[str, object] = {
         "u_textured": "base_texture" in textures,
         "u_has_base_factor": material.base_color is not None,
         "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
@@ -209,7 +209,7 @@ def _uniforms(
     return values
 
 
-def _colors(material: Material) -> dict[str, Any]:
+def _colors(material: Material) -> dict[str, object]:
     """Return the uniforms of the colours that expressions may change."""
     rim = material.rim or Rim()
     return {
