@@ -33,7 +33,7 @@ from viewer.loading import MotionSettings, load
 from viewer.phrases import brief, printable, rounded
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.annotations import VertexField
-from viewer.rig.comparison import Difference, Measure, compare
+from viewer.rig.comparison import Difference, Measure, MeasureKind, compare
 from viewer.rig.comparison.steps import FrameRange
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scalars import length_unit
@@ -351,7 +351,7 @@ class _Compared:
         return bool(self.error or self.mismatches or not self.differences) or any(parts)
 
 
-def _amount(value: float, kind: str, difference: Difference) -> str:
+def _amount(value: float, kind: MeasureKind, difference: Difference) -> str:
     """Return a number as text: lengths in millimetres or as a fraction of the size."""
     if kind == "angle":
         return f"{rounded(math.degrees(value), 4)}\N{DEGREE SIGN}"

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import viewer
 from viewer.commands._printing import print_line
@@ -69,7 +69,7 @@ class _Finding:
     """One line of the report: subject, state, details and a remedy."""
 
     subject: str
-    state: str  # "ok", "note" or "missing"
+    state: Literal["ok", "note", "missing"]
     found: str
     cure: str = ""
     is_vital: bool = False

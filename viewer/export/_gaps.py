@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
-from viewer.export._options import GAPS
+from viewer.export._options import GAPS, GapHandling
 from viewer.phrases import agree, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
@@ -18,14 +19,16 @@ from viewer.rig.motion.evaluation import Frames
 
 Indices = NDArray[np.intp]
 
-_CLOSED = {
+_CLOSED: dict[str, str] = {
     "hold": "{poses}",
     "interpolate": "interpolated, held at both ends",
     "split": "one file for each run of frames",
 }
 
 
-def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> list[Diagnostic]:
+def gaps_note(
+    present: Bools, first_frame: int, closing: GapHandling, **how: str
+) -> list[Diagnostic]:
     """Return a note about missing frames and how they were closed; ``how`` may rephrase it."""
     if present.all():
         return []
@@ -110,11 +113,13 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     )
 
 
-def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, list[Diagnostic]]:
+def kept_gaps(
+    frames: Frames, gaps: Literal[""] | GapHandling, first_frame: int
+) -> tuple[Frames, list[Diagnostic]]:
     """Return frames with gaps unless ``gaps`` asks to close them, and a note about closed ones."""
     check_gaps(gaps or "split")
     present = frames.present
-    if gaps in ("", "split") or present.all() or not present.any():
+    if not gaps or gaps == "split" or present.all() or not present.any():
         return frames, []
     return filled(frames, gaps == "interpolate"), gaps_note(present, first_frame, gaps)
 

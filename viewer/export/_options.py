@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from viewer.data_classes import dataclass, setting
 from viewer.rig.geometry.vectors import SignedUp, Up
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 
-ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
+RotationOrder: TypeAlias = Literal["zyx", "zxy", "xyz", "xzy", "yxz", "yzx"]
+ROTATION_ORDERS: tuple[RotationOrder, ...] = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
 
-QUATERNIONS = ("xyzw", "wxyz")
+QuaternionOrder: TypeAlias = Literal["xyzw", "wxyz"]
+QUATERNIONS: tuple[QuaternionOrder, ...] = ("xyzw", "wxyz")
 """Orders of quaternion components in arrays."""
 
-GAPS = {
+GapHandling: TypeAlias = Literal["hold", "interpolate", "split"]
+GAPS: dict[GapHandling, str] = {
     "hold": "hold the pose before the gap; at the start, the first pose",
     "interpolate": "interpolate between the frames around the gap, rotations along the shorter arc",
     "split": "one file for each run of frames",
@@ -29,7 +32,7 @@ SAFE_NAMES = (
 )
 """What ``ExportOptions.safe_names`` does, for the help of the option and of the check box."""
 
-_CLOSED = "hold"  # default of formats that do not support missing frames
+_CLOSED: GapHandling = "hold"  # default of formats that do not support missing frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +78,16 @@ class ExportOptions:
         flag="--to-up",
         choices=("y", "z"),
     )
-    rotation_order: str = setting("zyx", "BVH (default: {default})", choices=ROTATION_ORDERS)
-    quaternions: str = setting(
+    rotation_order: RotationOrder = setting(
+        "zyx", "BVH (default: {default})", choices=ROTATION_ORDERS
+    )
+    quaternions: QuaternionOrder = setting(
         "xyzw",
         "arrays (.npz): order of the components (default: {default})",
         choices=QUATERNIONS,
     )
-    gaps: str = ""
-    """A key of ``GAPS``; empty for the format's default: missing frames are omitted if the format
+    gaps: Literal[""] | GapHandling = ""
+    """Empty for the format's default: missing frames are omitted if the format
     allows it, and held otherwise."""
     rest_frame: bool = setting(False, "BVH: begin with a rest pose frame")
     digits: int = setting(
@@ -103,6 +108,6 @@ class ExportOptions:
     """Name, authors and licence of a VRM character."""
 
     @property
-    def closing(self) -> str:
-        """Handling of gaps in formats that do not support missing frames, a key of ``GAPS``."""
+    def closing(self) -> GapHandling:
+        """Handling of gaps in formats that do not support missing frames."""
         return self.gaps or _CLOSED

@@ -13,7 +13,7 @@ from viewer.batching.execution import attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.naming import filled
 from viewer.batching.worker_process import worker_rank
-from viewer.commands._batch.planning import TIMEOUT, add_batch_arguments
+from viewer.commands._batch.planning import TIMEOUT, Writes, add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
@@ -31,7 +31,7 @@ class JobKind:
     title: str
     suffix: str = ""
     """Suffix of the outputs in a folder if ``--to`` is not given."""
-    writes: str = "never"
+    writes: Writes = "never"
     prints: bool = False
     """Whether its text is the result and is therefore printed."""
     few: int = 16

@@ -9,7 +9,7 @@ import stat
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from viewer.batching.engines import Limits
 from viewer.batching.engines._cluster_text import parse_cluster
@@ -131,10 +131,14 @@ class Request:
     """Template for the joint map of each item."""
 
 
+Writes: TypeAlias = Literal["always", "maybe", "never"]
+"""Whether a job writes files: maybe means that it depends on its options."""
+
+
 def add_batch_arguments(
     parser: argparse.ArgumentParser,
     suffix: str = "",
-    writes: str = "always",
+    writes: Writes = "always",
     has_fixed: bool = False,
     timeout: float | None = TIMEOUT,
 ) -> None:

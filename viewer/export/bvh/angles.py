@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.export._options import RotationOrder
 from viewer.rig.arrays import Bools, Floats
 
 _WHOLE = 2.0 * np.pi  # radians in a revolution
@@ -11,7 +12,7 @@ _BLOCK = 256  # frames
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
 
 
-def euler_angles(matrices: Floats, order: str) -> Floats:
+def euler_angles(matrices: Floats, order: RotationOrder) -> Floats:
     """Return radians a, b, c (..., 3) with R = R_i(a) R_j(b) R_k(c) for the axes of ``order``."""
     # With e = 1 if i, j, k is a cyclic permutation of x, y, z, else -1: R[j, k] = -e sin a cos b,
     # R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b, from -pi / 2 to pi / 2, and c.
@@ -31,7 +32,7 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
     return np.stack([first, second, third], axis=-1)
 
 
-def unrolled(angles: Floats, order: str) -> Floats:
+def unrolled(angles: Floats, order: RotationOrder) -> Floats:
     """Return equivalent angles (N, ..., 3) that are nearest to those of the previous frame."""
     return Unroller(order).following(angles)
 
@@ -39,7 +40,7 @@ def unrolled(angles: Floats, order: str) -> Floats:
 class Unroller:
     """Unwrapping of angles over time, block by block, for one order of the axes."""
 
-    def __init__(self, order: str) -> None:
+    def __init__(self, order: RotationOrder) -> None:
         self._sign = _sign(order)
         self._first: Floats | None = None  # first angle of the last frame without gimbal lock
         # Angles of the last frame: as given, and in the chosen form.
@@ -119,5 +120,5 @@ def _wrapped(angles: Floats) -> Floats:
     return angles - _WHOLE * _revolutions(angles)
 
 
-def _sign(order: str) -> float:
+def _sign(order: RotationOrder) -> float:
     return 1.0 if order in ("xyz", "yzx", "zxy") else -1.0

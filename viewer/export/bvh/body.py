@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.export._options import RotationOrder
 from viewer.export.bvh.angles import euler_angles
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
@@ -52,7 +53,7 @@ class Conversion:
     """Conversion of a figure's frames to channels; one frame gives the shape of all bones."""
 
     def __init__(
-        self, figure: Figure, frames: Frames, reference: int, order: str, space: Space
+        self, figure: Figure, frames: Frames, reference: int, order: RotationOrder, space: Space
     ) -> None:
         self._figure, self._order, self._space = figure, order, space
         skeleton = figure.require_skeleton()

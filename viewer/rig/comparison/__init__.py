@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -56,6 +57,9 @@ def compare(
     return _Comparison(first, second, skinning or Skinning(), steps).run()
 
 
+MeasureKind: TypeAlias = Literal["length", "angle", "weight"]
+
+
 @dataclass(frozen=True, slots=True)
 class Difference:
     """The differences of two figures or motions."""
@@ -84,9 +88,8 @@ class Measure:
 
     name: str
     """``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …."""
-    kind: str
-    """One of "length", "angle" or "weight". Lengths are in the first figure's unit, angles in
-    radians; weights are dimensionless."""
+    kind: MeasureKind
+    """Lengths are in the first figure's unit, angles in radians; weights are dimensionless."""
     maximum: float
     mean: float
     """Maximum and mean over all compared items and steps."""
@@ -210,7 +213,9 @@ class _Comparison:
             side = "first" if second is None else "second"
             self.mismatches.append(Diagnostic(key, values={"side": side}))
 
-    def _tally(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> _Tally:
+    def _tally(
+        self, name: str, kind: MeasureKind, count: int, items: tuple[str, ...] = ()
+    ) -> _Tally:
         self.tallies.append(_Tally(name, kind, count, items))
         return self.tallies[-1]
 
@@ -340,7 +345,9 @@ class _Comparison:
 class _Tally:
     """Running maximum of a ``Measure``; ``worst`` is negative before the first step."""
 
-    def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, name: str, kind: MeasureKind, count: int, items: tuple[str, ...] = ()
+    ) -> None:
         self.name, self.kind, self.items = name, kind, items
         self._maxima = np.zeros(count)
         self._sum, self._count = 0.0, 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -45,7 +47,7 @@ class MotionArrays:
     _frames: Frames
     _placement: Floats
 
-    def joints(self, space: str = "world") -> Floats:
+    def joints(self, space: Literal["world", "figure"] = "world") -> Floats:
         """Return the positions of all joints.
 
         Parameters

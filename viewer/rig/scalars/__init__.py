@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 from keyword import iskeyword
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -31,6 +32,8 @@ _METRE = 999.5  # millimetres that would be rounded to 1000 mm
 _LEAST = 0.001  # length in millimetres or percent that is shown instead of shorter ones
 _ZERO = 1e-6  # rounding errors below this are 0
 
+ScalarKind: TypeAlias = Literal["sequential", "diverging", "discrete", "categorical"]
+
 
 @dataclass(frozen=True, slots=True)
 class _Quantity:
@@ -42,16 +45,15 @@ class _Quantity:
     """Module of this folder; its function has the name of the quantity's key."""
     needs: str
     """Part that a figure must have, as named in the message if it is missing."""
-    kind: str = "sequential"
+    kind: ScalarKind = "sequential"
     """``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0; ``"discrete"``:
     counts; ``"categorical"``: indices of named items."""
     unit: str = "length"
     """``"length"`` for figure units, otherwise the unit's name; empty if dimensionless."""
     moves: bool = True
     """Whether the values depend on the pose."""
-    about: str = ""
-    """``"joint"`` or ``"field"`` if the quantity refers to a joint or field, which its name may
-    specify; empty otherwise."""
+    about: Literal["", "joint", "field"] = ""
+    """What the quantity refers to and its name may specify; empty for nothing."""
     isolines: bool = False
     """Whether isolines are drawn by default."""
     least: float = 0.0
