@@ -45,7 +45,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     corners = welded(mesh.positions, mesh.triangles)[valid]
     yield from _against(subject, mesh, np.flatnonzero(~flat & known))
     yield from _flat(subject, flat)
-    yield from _doubled(subject, mesh, np.flatnonzero(whole))
+    yield from _duplicate_triangles(subject, mesh, np.flatnonzero(whole))
     yield from _crowded_edges(subject, mesh, np.flatnonzero(whole))
     yield from _sides(subject, mesh, valid, corners, known)
 
@@ -64,7 +64,7 @@ def _flat(subject: Subject, flat: Bools) -> Iterator[Finding]:
     )
 
 
-def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> Iterator[Finding]:
+def _duplicate_triangles(subject: Subject, mesh: Mesh, whole: Indices) -> Iterator[Finding]:
     rows = np.sort(mesh.triangles[whole], axis=1).astype(np.int64)
     keys = (rows[:, 0] * mesh.n_vertices + rows[:, 1]) * mesh.n_vertices + rows[:, 2]
     if mesh.n_vertices > 2_000_000:  # the product of three indices would overflow
