@@ -18,7 +18,7 @@ from viewer.loading.cleaning import clean_up
 from viewer.loading.settings import CleanUp
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.driven_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor, Scene
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from viewer.rig.bodies.joint_posing import JointPosing
     from viewer.rig.constraints.constraint import Constraint
     from viewer.rig.humanoid import Humanoid
-    from viewer.rig.springs.springs import Springs
+    from viewer.rig.springs.spring_joints import Springs
 
 DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""

@@ -25,7 +25,7 @@ from viewer.rig.motion.sampled_clip import with_rate
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.driven_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor, Scene
 

@@ -14,7 +14,7 @@ from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.spring_motion import release_springs, with_baked_springs
 from viewer.rig.scene import Actor
-from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.spring_joints import Springs
 
 ON = MotionSettings(springs=True)
 

@@ -11,7 +11,7 @@ from viewer.loading import load
 from viewer.rig.feet.legs import Leg, animal_legs, bend, hinges, legs_of, lowering, reach
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import frames_of, world_frames
-from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.driven_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.shape import rest_joints
 

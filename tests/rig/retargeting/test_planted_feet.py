@@ -16,7 +16,7 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.driven_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.shape import rest_joints
 

@@ -16,7 +16,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.driven_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 
 JOINTS = ("UpLeg", "Leg", "Foot")

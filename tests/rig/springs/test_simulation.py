@@ -11,7 +11,7 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 from viewer.rig.springs.simulation import STEPS_PER_SECOND, Simulation
-from viewer.rig.springs.springs import INSIDE, PLANE, Colliders, Springs
+from viewer.rig.springs.spring_joints import INSIDE, PLANE, Colliders, Springs
 
 STEP = 1.0 / STEPS_PER_SECOND
 

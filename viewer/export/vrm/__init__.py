@@ -41,7 +41,7 @@ from viewer.rig.file_record import Json, VrmRecord
 from viewer.rig.humanoid import REQUIRED_BONES
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.spring_joints import Springs
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _STRAIGHT = 1e-4  # radians

@@ -22,7 +22,7 @@ from viewer.rig.geometry.vectors import Up
 from viewer.rig.material import Material
 from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
-from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.spring_joints import Springs
 
 REACH = 1e18
 """Largest coordinate that can be drawn: the squares of lengths must fit into single precision."""

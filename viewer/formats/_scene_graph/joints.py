@@ -15,7 +15,7 @@ from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_mat
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import joint_worlds
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.springs.springs import Colliders, Springs
+from viewer.rig.springs.spring_joints import Colliders, Springs
 
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 _BY_SPRING = ("tails", "stiffness", "drags", "gravities", "radii")

@@ -26,7 +26,7 @@ from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.springs.simulation import STEPS_PER_SECOND, PosedJoints, SpringTrack
-from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.spring_joints import Springs
 
 _MOST_TRACKS = 4
 

@@ -14,7 +14,7 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix, up_rotation
 from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.feet import feet_notes, plant_feet
+from viewer.rig.retargeting.driven_feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_alignment import rest_of

@@ -30,7 +30,7 @@ from viewer.rig.geometry.quaternion import between, multiply, slerp
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.vectors import inverse_transposed, unit
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.springs.springs import INSIDE, PLANE, Springs
+from viewer.rig.springs.spring_joints import INSIDE, PLANE, Springs
 
 STEPS_PER_SECOND = 60
 """Simulation steps per second; the result depends on this rate, as in other programs."""
