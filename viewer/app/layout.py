@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import field
 from importlib import import_module
 from types import ModuleType
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 from imgui_bundle import imgui
 
@@ -27,6 +27,8 @@ _THREE_ROWS = 60.0  # font sizes: lower windows have two rows of panels on the r
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
+Dock: TypeAlias = Literal["left", "bottom", "right 1", "right 2", "right 3"]
+
 
 @dataclass(frozen=True, slots=True)
 class Panel:
@@ -36,8 +38,8 @@ class Panel:
     """Folder of the panel's module, ``<name>_panel.py``."""
     title: str
     """Title of its tab."""
-    place: str
-    """Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards."""
+    place: Dock
+    """Initial dock; those on the right are numbered downwards."""
     needs: str = ""
     """Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
     ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a

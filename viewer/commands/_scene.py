@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from viewer.commands._cleanup import clean_up_of
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
@@ -63,6 +63,8 @@ _METAVAR = {
     "check": "interpolate",
     "write": "hold|split|interpolate[:N|:Ns]",
 }
+
+GapUse: TypeAlias = Literal["view", "check", "write"]
 
 
 @dataclass(slots=True)
@@ -141,7 +143,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
     add_settings(group, SceneOptions, "body", "model_path", "max_size", "no_cache")
 
 
-def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
+def add_capture_arguments(parser: argparse.ArgumentParser, gaps: GapUse = "check") -> None:
     """Add the options that control how captures and BVH are read."""
     group = parser.add_argument_group("captures and BVH")
     add_settings(group, MotionSettings, "model", "gender")
@@ -294,7 +296,7 @@ def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warn
             print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)
 
 
-def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
+def add_gap_arguments(group: argparse._ArgumentGroup, use: GapUse) -> None:
     """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
 
     ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``. Parsing sets
