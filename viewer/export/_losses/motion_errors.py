@@ -103,10 +103,9 @@ def frames_losses(
     ``path``: the written file.
     ``animation``: the original; missing frames are not compared.
     ``written``: contents of the file: poses of the animation's figure, one per frame of the span.
-    ``how``: skinning of the mesh; for both motions LBS replaces its method, which the file of a
-      motion does not store.
-    ``span``: half-open range of frames in the file; all if
-      omitted.
+    ``how``: skinning of the mesh; both motions are compared with LBS (linear blend skinning)
+      instead of its method, which the file of a motion does not store.
+    ``span``: half-open range of frames in the file; all if omitted.
     ``is_between``: whether the times of these poses are between the frames.
     """
     figure, frames = animation.figure, animation.frames
@@ -133,11 +132,11 @@ def frames_losses(
 # differ most; a capture, which has no curves, at the times of its own frames.
 #
 # Both motions are smooth in a span between neighbouring keys or frames: mostly a cubic and the
-# line, or arc, that interpolates it. Their difference is 0 at both ends if these were written, and
-# has at most two extrema in between. It is sampled in each span, and the highest samples are
-# refined (``_refined``). Whatever the curves are, a reported distance exists at a time of the
-# motion: a missed maximum makes the result too small, never too large. If there are too many spans
-# to sample, the note calls the result an estimate.
+# line, or arc, that interpolates it. Their difference is 0 at both ends if the file has poses at
+# these times, and has at most two extrema in between. It is sampled in each span, and the highest
+# samples are refined (``_refined``). Whatever the curves are, a reported distance exists at a time
+# of the motion: a missed maximum makes the result too small, never too large. If there are too many
+# spans to sample, the note calls the result an estimate.
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 
@@ -149,14 +148,14 @@ _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 _MOST = 8192  # steps of all spans before refinement; each step, and each span, adds a sample
 _STEPS = 16  # steps of a span at most: more improve the best sample by less than 2 %
 _FEWEST = 4  # steps of a span; if there are fewer, only likely spans are sampled
-_LIKELY = 256  # number of likely spans, for joints and vertices each: 16 steps of each
+_LIKELY = 256  # number of likely spans, for joints and vertices each: 2 x 256 x 16 steps = _MOST
 _MOST_ROUNDS = 8192  # repetitions of a curve whose keys count; evenly spaced if there are more
 _INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
 _SHORT = 1e-6  # spans shorter than this, in frames, are ignored
 _BLOCK = 1024  # poses per block, which limits the memory
 _PEAKS = 64  # maximum number of refined peaks
 # Samples lower than this fraction of the highest one are not refined. The largest distance of all
-# has a sample above 91 % of the highest one; the rest is for curves that are not cubics.
+# has a sample above 91 % of the highest one; the margin is for curves that are not cubics.
 _HOPEFUL = 0.75
 _NEAR, _ROUNDS = 8, 4  # steps around a peak, and how often they are narrowed: see ``_refined``
 _Sampler = Callable[[Floats], Frames]
@@ -190,7 +189,11 @@ def between_losses(
     how: Skinning,
     also: Floats | None = None,
 ) -> list[Diagnostic]:
-    """Return a note with the largest errors of a file between an animation's frames, if any."""
+    """Return a note with the largest errors of a file between an animation's frames, if any.
+
+    ``written``: returns the file's poses at times in seconds. ``also``: further times at which a
+    sampled motion is compared, such as the middles between frames.
+    """
     estimate: Phrase | str = ""
     if animation.motion.kind != "sampled":
         edges = np.union1d(
@@ -379,7 +382,7 @@ class _Pair:
         return replace(self, followed=followed_vertices(*self._sides(times), rows))
 
     def heights(self, times: Floats) -> Floats:
-        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
+        """Return the largest distance at each time, of joints and any vertices: (1 or 2, T)."""
         blocks = [np.zeros((1 if self.followed is None else 2, 0))]
         for start in range(0, len(times), _BLOCK):
             first, second = self._sides(times[start : start + _BLOCK])

@@ -61,8 +61,8 @@ _EXTENDED = 0.97
 # above _CALM. Six recordings have at most 1.06 without any: 1.15 is beyond such chance, and too
 # little to be seen. The ratio of kneeling, in which feet are lifted far, is 1.26 without and 1.00
 # with 0.1 s. ``contacts`` limits either to a third of the contact, so that more than 0.2 s changes
-# only contacts longer than 0.6 s: 0.3 s lowers no knee ratio above 1.15 by more than 0.01 (2.44 of
-# kneeling with short legs), while feet slide farther.
+# only contacts longer than 0.6 s: 0.3 s lowers no knee ratio above 1.15 by more than 0.01 (that of
+# kneeling with short legs stays at 2.44), while feet slide farther.
 _EASES, _CALM = (0.1, 0.2), 1.15
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
 
@@ -76,12 +76,12 @@ _STILL = 10.0
 _EASE = 0.15
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3; see _strength
 
-# The same for the tilt of a sole and for the limit of a lifted foot, which are quicker.
+# Like _EASE, for the tilt of a sole and for the limit of a lifted foot, which are quicker.
 _LEVELS = 0.06
 _FLAT = 6.0  # decimal exponent of the weight of a standing foot's tilt
 
-# The same for the noise of a standing foot's rotation. 0.02 or 0.08 changes knee ratios by at most
-# 2 %.
+# Like _EASE, for the noise of a standing foot's rotation. 0.02 or 0.08 changes knee ratios by at
+# most 2 %.
 _NOISE = 0.04
 
 # Cosines of the tilts beyond which a sole is unchanged and below which it is fully levelled. Feet
@@ -540,12 +540,13 @@ def _foot_shifts(
     # has no quick part, so it need not be subtracted first. 3. Feet relative to this body, and the
     # quick part in which they still differ from it. 4. Feet relative to the final body.
     #
-    # The smooth curves of feet in the air differ from the body's motion, so step 3 finds at most
-    # 0.25 % of the body, another one 0.16 %. The knee ratio of the walk whose root jumps is 3.8
+    # Step 3 is needed because smooth curves of feet in the air do not follow the body exactly. It
+    # changes the body by at most 0.25 % of its size; one more round would change it by 0.16 %. The
+    # knee ratio of the walk whose root jumps is 3.8
     # without the quick part, 0.79 (0.49 with short legs) if step 3 is left out, 0.79 (0.36) with
     # it, and the same after further rounds.
     every = [_wanted(plan, foot, points[foot], heights[:, foot]) for foot in range(len(points))]
-    # A bent leg can lengthen, so its foot needs no help of the body; a straight one cannot.
+    # A bent leg can lengthen, so its foot needs no help from the body; a straight one cannot.
     bent = falling((straight - _STRAIGHT[0]) / (_STRAIGHT[1] - _STRAIGHT[0]))
     # A leg counts as straight from the middle of the fade; a limit of 0.25 or 0.75 instead of 0.5
     # changes knee ratios by at most 2 %.
@@ -569,8 +570,8 @@ def _wanted(plan: _FootPlan, foot: int, points: tuple[Floats, Floats], heights: 
     for contact, rows, ground in plan.stances(foot):
         # With hold h, the foot is to move by (1 - h) times the step of the source's foot: not at
         # all while it stands, like the source when it leaves. A capture's own steps are noise, so
-        # there the correction only gets weaker. It is what is missing, and its mean is 0, so that
-        # no direction of the slide is preferred.
+        # there the correction only gets weaker. The correction is the wanted path minus the actual
+        # one, shifted so that its mean over the contact is 0: it prefers no direction of the slide.
         loose = np.zeros_like(contact.hold) if plan.is_own else 1.0 - contact.hold
         wanted = loose[:, None] * plan.steps((path.toe, path.heel), contact)
         steps = np.cumsum(plan.steps(points, contact) - wanted, axis=0)
@@ -593,11 +594,11 @@ def _standing_heights(low: Floats, contact: Contact) -> Floats:
 
 
 def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0) -> list[Floats]:
-    """Return feet's translations (N, 3), ``base`` off contacts; ``n_lifts``: passes of lifting."""
+    """Return feet's translations (N, 3), ``base`` far from contacts; ``n_lifts``: passes."""
     # Everything is relative to the body, base: then 0 is the target of a foot in the air, which is
-    # what smooth curves with weight 1 decay to. Each foot has two curves, because rows can be held
-    # at a height without a horizontal target: rows [0, count) of the arrays are horizontal, with 3
-    # components, rows [count, 2 count) vertical, with 1 (the others stay 0).
+    # what smooth curves with weight 1 decay to. Each foot has two curves, because lifting adds
+    # weight to the vertical one only: entries [0, count) of the first axis are horizontal, with 3
+    # components, entries [count, 2 count) vertical, with 1 (the others stay 0).
     up, count = plan.up, len(every)
     lift = base @ up
     aside = base - lift[:, None] * up
@@ -649,7 +650,7 @@ def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 
 
 
 def _calmed(plan: _FootPlan, targets: Floats, holds: Floats) -> Floats:
-    """Return the targets of held rows without the source's sudden jumps, which knees would make."""
+    """Return targets of held rows without the source's sudden jumps, which knees would absorb."""
     # A jump is what a curve of 0.03 s does not follow: ``smooth`` is the target without it. A
     # target is a correction, the held place of the foot minus its uncorrected place. If the latter
     # jumps, a target without the jump lets the foot jump along with the source, and the leg need
@@ -667,9 +668,9 @@ def _calmed(plan: _FootPlan, targets: Floats, holds: Floats) -> Floats:
 
 def _strength(holds: Floats) -> Floats:
     """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
-    # Relative to s^4 = 6561 (0.15 s at 60 rows per second): a hold of 0.25 weighs 1.25, which the
-    # curve ignores; 0.5 weighs 500, which bends it; 0.75 weighs 7.5e5 and 1 weighs 1e9, which fix
-    # it.
+    # For comparison, s^4 = 6561 (0.15 s at 60 rows per second): a hold of 0.25 weighs 1.25, which
+    # the curve ignores; 0.5 weighs 500, which bends it; 0.75 weighs 7.5e5 and 1 weighs 1e9, which
+    # fix it.
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 

@@ -76,7 +76,7 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
 
 
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
-    """Return whether all bones of one hierarchy (``matches.is_hierarchy``) have one direction."""
+    """Return whether all bones point the same way in both; needs ``matches.is_hierarchy``."""
     # Every joint has a partner then: -1, no partner, would be taken for the last joint. Lengths may
     # differ: |a| |b| cos is compared with |a| |b| times the limit.
     inner = np.flatnonzero(parents >= 0)
@@ -91,14 +91,15 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
 def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
     """Return rotations (J, 3, 3) from the target's rest pose to the source's, in common axes."""
     # B of the module retarget: W_t = W_s R_s^-1 B R_t with the world rotations W of a joint in a
-    # frame and R at rest, of the source s and the target t. If the target's rest pose, rotated by B
-    # at each joint, is the source's rest pose, then the target shows the source's pose in every
-    # frame. A bone gives two of the three degrees of freedom of B, its direction; the rest, the
-    # twist about the bone, comes from a rotation that both bodies have: of the whole body or of the
-    # nearest matched ancestor (reference). Joints are visited from the root down, so that the
-    # reference is known. So limbs rotate from the body without twist, a finger's joint from the one
-    # above it; hands with fingers also align the knuckle line; trunk and feet follow the body
-    # unless they differ greatly, and the last joint of a limb follows the one before it.
+    # frame and R at rest, of the source s and the target t, all in the common axes. If the target's
+    # rest pose, rotated by B at each joint, is the source's rest pose, then the target shows the
+    # source's pose in every frame. A bone gives two of the three degrees of freedom of B, its
+    # direction; the rest, the twist about the bone, comes from a rotation that is already known: of
+    # the whole body or of the nearest matched ancestor (reference). Joints are visited from the
+    # root down, so that the reference is known. So limbs rotate from the body without twist, a
+    # finger's joint from the one above it; hands with fingers also align the knuckle line; trunk
+    # and feet follow the body unless they differ greatly, and the last joint of a limb follows the
+    # one before it.
     whole_body = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
     above = _matched_above(matches, parents)
@@ -138,7 +139,8 @@ def _at_joint(
         return reference
     # Spines and feet of two characters bend differently by nature. If B aligned them, a stooped
     # character would be straightened, and soles would tilt, so they keep their bend relative to the
-    # body. Beyond 25 degrees it is no nature but another rest pose, as of a body with hanging feet.
+    # body. Beyond 25 degrees, which nine of ten pairs of standing bodies keep to, the difference is
+    # due to another rest pose, as of a body with hanging feet, and is aligned.
     if part.startswith(_NATURALLY_BENT):
         near = np.einsum("ab,kb,ka->k", whole_body, mine, theirs)
         if part == "pelvis" or (near > _NATURAL).all():
@@ -151,11 +153,12 @@ def _at_joint(
         # The rotation B that minimises sum_k |theirs_k - B mine_k|^2 maximises the trace of B^T M
         # with M = sum_k theirs_k mine_k^T, and is the rotation nearest to M (Kabsch 1976; Horn
         # 1987). M has rank 1 if all directions are parallel, and then leaves the twist open: a
-        # millionth of the reference decides it. It also changes the twist of others: two directions
-        # at an angle f give M the singular values 1 + cos f, 1 - cos f and 0, and the resistance to
-        # twist is the sum of the last two, about f^2 / 2. The reference pulls with at most 2e-6, so
-        # it twists by up to 4e-6 / f^2 radians: 0.008 degrees at f = 10 degrees. Below about 0.1
-        # degrees it decides, as it should; bones are never rotated by more than about 1e-3.
+        # millionth of the reference decides it. It also changes the twist where directions are not
+        # parallel: two directions at an angle f give M the singular values 1 + cos f, 1 - cos f and
+        # 0, and the resistance to twist is the sum of the last two, about f^2 / 2. The reference
+        # pulls with at most 2e-6, so it twists by up to 4e-6 / f^2 radians: 0.008 degrees at f = 10
+        # degrees. Below about 0.1 degrees it decides, as it should; bones are never rotated by more
+        # than about 1e-3 radians.
         sums = np.einsum("ka,kb->ab", theirs, mine) + _SLIGHT * reference
         return nearest_rotations(sums)[0]
     # B = A S: S brings the target's bone near, A is the smallest rotation from there to the
@@ -201,9 +204,9 @@ def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats
 
 
 def _matched_above(matches: Matches, parents: Ints) -> Ints:
-    """Return the nearest matched ancestor of each joint, -1 for none: (J,)."""
+    """Return each joint's nearest matched ancestor (J,): -1 for none, -2 for unmatched joints."""
     above = np.full(len(parents), -1, dtype=np.int32)
-    for joint, parent in enumerate(parents):
+    for joint, parent in enumerate(parents):  # parents precede children
         if parent >= 0:
             above[joint] = parent if matches.partners[parent] >= 0 else above[parent]
     above[matches.partners < 0] = -2  # unmatched joints are not children of any joint
@@ -242,10 +245,10 @@ def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
     if part is None or not high or not low:
         return None
     height = np.mean(high, axis=0) - np.mean(low, axis=0)
-    # The bend of the spine must not tilt an upright body. ``retarget`` has stood up a lying source
-    # before, so both bodies are upright as a rule. If one leans by more than 25 degrees, its rest
-    # pose is taken to lean as a whole: B contains all of its lean, and nothing of the other's,
-    # which is at most 25 (the bundled body leans by 2, SMPL by 1).
+    # The bend of the spine must not tilt an upright body. ``retarget`` has already rotated a lying
+    # source upright, so both bodies are upright as a rule. If one leans by more than 25 degrees,
+    # its rest pose is taken to lean as a whole: B contains all of its lean, and nothing of the
+    # other's, which is at most 25 (the bundled body leans by 2, SMPL by 1).
     is_upright = height @ up > _UPRIGHT * np.linalg.norm(height)
     return _frame(places[f"left_{part}"] - places[f"right_{part}"], up if is_upright else height)
 
