@@ -59,7 +59,6 @@ from viewer.export._motion_paths import PERSON, is_together, motion_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
 from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
-from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
@@ -286,6 +285,8 @@ class _Request:
 
     def parts(self, options: ExportOptions) -> Iterator[SampledAnimation]:
         """Yield the requested frames."""
+        from viewer.loading.skeleton_motions import as_asked
+
         first, stop = self.span
         for clip in self.stream.clips(first, stop):
             motion = as_asked(replace(self.stream.motion, clip=clip), self.settings)
@@ -417,10 +418,7 @@ def _exporter(kind: str, frames: Frames, output: Path, scene: Scene) -> str:
         if kind not in ("", key):
             exporters_of("", "points")
         return key
-    if kind:
-        _check_kind(kind, output)
-        return kind
-    return suited_exporter(output, first.figure)
+    return kind or suited_exporter(output, first.figure)
 
 
 def _requested_frames(frames: Frames, actor: Actor) -> tuple[int, int | None] | None:
