@@ -204,7 +204,7 @@ def _stamp(path: str) -> tuple[object, ...]:
 
 @cache
 def _unchanged_digest(path: str, stamp: tuple[object, ...]) -> bytes:
-    """Return the hash of files that all items read, again if their sizes or times change."""
+    """Return the hash of a file that all items read; computed again if its stamp changes."""
     return _digest(path)
 
 

@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase, note, wording
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES, Source
 from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
@@ -404,8 +405,8 @@ class _Archive:
                 size=self.size,
             )
 
-    def _fault(self, key: str, **values: object) -> FormatError:
-        return FormatError(note(key, self.shown, **values))
+    def _fault(self, key: str, **values: Any) -> FormatError:
+        return FormatError.fault(key, self.shown, **values)
 
 
 @contextmanager

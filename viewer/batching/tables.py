@@ -41,7 +41,7 @@ def ordered(results: Iterable[Result]) -> list[Result]:
 
 
 def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
-    """Write results, in the order of inputs, as CSV (RFC 4180, UTF-8); return the items' number."""
+    """Write results as CSV (RFC 4180, UTF-8) in the order of the inputs; return their number."""
     # The command determines the columns; those of a "function" are its values.
     results = ordered(results)
     values = [dict(_cells_in(result.values)) if job == "function" else {} for result in results]
@@ -111,7 +111,7 @@ def comparisons(result: Result) -> list[JsonObject]:
 
 
 def worst_measure(result: Result, group: str) -> tuple[JsonObject, JsonObject] | None:
-    """Return a result's largest measure of a group of ``MEASURES`` relative to size; its actor."""
+    """Return a group's measure that is largest relative to size, and its actor (``MEASURES``)."""
     pairs = [
         (measure, actor)
         for comparison in comparisons(result)

@@ -1,4 +1,4 @@
-"""Rank of this worker process within its batch."""
+"""Rank, memory limit and signal mask of this worker process."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Numbering:
         return self.first + self.count - 1
 
     def time_of(self, frame: int, option: str = "--frame") -> float:
-        """Return the time of a frame in seconds; ``option`` gave it."""
+        """Return the time of a frame in seconds; errors name the ``option`` that gave the frame."""
         last = _LAST_NUMBER if self.runs_on else self.last
         if not self.first <= frame <= last:
             wanted = f"{self.first} or more" if frame < self.first and self.runs_on else ""

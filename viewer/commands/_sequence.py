@@ -36,7 +36,7 @@ class Turntable:
 
 
 def parse_turntable(text: str) -> Turntable:
-    """Parse ``6``, ``6s``, ``90deg`` or an empty string."""
+    """Parse seconds per turn (``6``, ``6s``), degrees (``-90deg``) or an empty string, one turn."""
     if not text:
         return Turntable(_FULL, None)
     found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+))(s|deg)?", text.strip(), re.ASCII)

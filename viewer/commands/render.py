@@ -311,7 +311,7 @@ def _grid_step(points: Floats) -> float:
 def _complete(
     request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
 ) -> None:
-    """Set the kind of the requested output and its range of frames."""
+    """Set the requested output's kind and range of frames; refuse options that do not fit it."""
     output = request.output
     request.range = None if frames.frames is None else parse_range(frames.frames)
     asks = request.range is not None or request.turntable is not None

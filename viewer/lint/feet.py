@@ -125,7 +125,7 @@ def _floating(
     height: float,
     may_step: bool,
 ) -> Iterator[Finding]:
-    """Report a body whose lower foot rests above the ground, or above a step."""
+    """Report a body whose lower foot rests above the ground; ``may_step``: by less than a step."""
     lowest, size = heights.min(axis=1), track.scale * height
     step = float(track.times[1] - track.times[0])
     rests = resting_frames(lowest, track.present, step, size, limits.RESTS_FOR)

@@ -33,7 +33,6 @@ def slurm_cluster(
     name: ClusterName, memory: int | None, settings: Mapping[str, object]
 ) -> SLURMCluster:
     """Return a cluster whose workers are SLURM jobs; none is submitted yet."""
-    # These options describe a job; all others are passed to sbatch.
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
@@ -47,6 +46,7 @@ def slurm_cluster(
         raise ViewerError(
             "--cluster slurm needs dask-jobqueue: pip install dask-jobqueue"
         ) from None
+    # The options that are popped below describe a job; all others are passed to sbatch.
     options = dict(name.options)
     processes = name.workers_per_job
     options.pop("cpus", None)

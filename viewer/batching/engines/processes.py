@@ -308,7 +308,7 @@ def _note_termination(number: int, frame: FrameType | None) -> None:
 
 
 def _work(item: Item, since: float | None) -> Result:
-    """Run an item; outputs written ``since`` its first attempt are replaced, None if this is it."""
+    """Run an item; a further attempt replaces outputs written ``since`` the first (else None)."""
     assert _job is not None and _stopping is not None  # set by _prepare
     if _is_terminated:
         os._exit(128 + signal.SIGTERM)
