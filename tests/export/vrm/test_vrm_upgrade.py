@@ -275,6 +275,16 @@ def test_data_of_another_structure_does_not_prevent_writing(tmp_path, place, val
     assert written.root["extensions"]["VRMC_vrm"]["specVersion"] == "1.0"
 
 
+@pytest.mark.parametrize("springs", [[{"name": "x"}], [3], [{"joints": [{"node": [1]}]}]])
+def test_springs_of_version_1_in_a_file_of_version_0_are_listed_as_lost(tmp_path, springs):
+    file = swinging(0)
+    del old_vrm(file)["secondaryAnimation"]
+    file.root["extensions"]["VRMC_springBone"] = {"specVersion": "1.0", "springs": springs}
+    written, notes = upgrade(file, tmp_path)
+    assert "VRMC_springBone" not in written.root["extensions"]
+    assert "VRMC_springBone" in notes["X003.vrm-upgrade"].values["names"]
+
+
 def test_convert_writes_version_1(tmp_path, capsys):
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"
     path.write_bytes(swinging(0).glb())

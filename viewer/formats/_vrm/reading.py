@@ -74,12 +74,15 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     version = next((n for n in (1, 0) if isinstance(given.get(_KEYS[n]), dict)), None)
     if version == 0:
         old = upgrade(file, source)
-        extensions = {name: told for name, told in given.items() if name != "VRM"}
+        # Springs of a 0.x file are those of its ``secondaryAnimation``.
+        replaced = ("VRM", "VRMC_springBone")
+        others = {name: told for name, told in given.items() if name not in replaced}
+        unused = ["VRMC_springBone"] if "VRMC_springBone" in given else []
         file = replace(
             file,
-            extensions={**extensions, **old.extensions},
+            extensions={**others, **old.extensions},
             toon=old.toon,
-            old_members=tuple(old.lost),
+            old_members=(*old.lost, *unused),
         )
         ends = old.ends
     file = replace(file, springs=read_springs(file, source, ends))
