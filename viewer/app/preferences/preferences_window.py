@@ -102,8 +102,10 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
     if preferences.theme == "system" and not appearance.system_theme:
         imgui.text_disabled("the theme of this system is unknown: dark is used")
     _draw_scale(state, preferences)
+    size = preferences.font_size
     draw_setting(state, "Font size", preferences, "font_size")
-    preferences.font_size = float(round(preferences.font_size))
+    if preferences.font_size != size:
+        preferences.font_size = float(round(preferences.font_size))
 
 
 def _draw_scale(state: AppState, preferences: Preferences) -> None:
