@@ -126,6 +126,8 @@ def test_stored_preferences_are_restored():
         {"scale": True},
         {"font_size": "big"},
         {"font_size": 1e9},
+        {"font_size": 10**400},
+        {"scale": 10**400},
         {"in_degrees": 1},
         {"samples": 3},
         {"up": ["y"]},

@@ -104,9 +104,9 @@ def load_preferences(say: Callable[[str], object] = to_stderr) -> Preferences:
     preferences = Preferences(keys=_texts(found.get("keys")))
     for each in fields(Preferences):
         value = found.get(each.name)
-        if type(value) is int and type(each.default) is float:
-            value = float(value)
         if each.metadata and _fits(each, value):
+            if isinstance(each.default, float) and isinstance(value, int):
+                value = float(value)
             setattr(preferences, each.name, value)
     known = asdict(preferences)
     wrong = [name for name in found if name in known and found[name] != known[name]]
@@ -139,11 +139,12 @@ def _present_name(stored: str) -> str:
 
 def _fits(each: Field[object], value: object) -> bool:
     """Return whether a stored value has the type of a field, and is one that the field allows."""
-    if type(value) is not type(each.default):
+    # Any integer is a number for JSON, even one that is too large for a float.
+    if type(value) not in ((int, float) if type(each.default) is float else (type(each.default),)):
         return False
     if "limits" in each.metadata:
         low, high = each.metadata["limits"]
-        return isinstance(value, float) and low <= value <= high
+        return isinstance(value, int | float) and low <= value <= high
     return value in each.metadata.get("choices", (True, False))
 
 
