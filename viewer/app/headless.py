@@ -102,10 +102,10 @@ class HeadlessApp:
         self._wording.close()
         self._make_current()
         self._graphics.rest()
+        self.frame.release()  # it has contexts that need those of ImGui
         imgui.backends.opengl3_shutdown()
         implot.destroy_context(self._implot)
         imgui.destroy_context(self._imgui)
-        self.frame.release()
         self.screen.release()
         if self._is_owner:
             self._graphics.release()
