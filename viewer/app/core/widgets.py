@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, TypeVar
 
@@ -96,11 +96,11 @@ def warning(text: str) -> None:
         imgui.text_wrapped(text)
 
 
-def is_reset(text: str) -> bool:
+def is_reset(text: str | Callable[[], str]) -> bool:
     """Give the last widget a tooltip; return whether a double click resets the widget."""
     if not imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
         return False
-    show_tooltip(text)
+    show_tooltip(text if isinstance(text, str) else text())
     return imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
 
 

@@ -132,7 +132,8 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     # Each joint's number, as text, precedes its curves.
     shown: list[int | str] = []
-    wanted = (r for r, c in enumerate(curves) if view.filter.lower() in c.label.lower())
+    text = view.filter.lower()
+    wanted = (r for r, c in enumerate(curves) if not text or text in c.label.lower())
     for number, found in groupby(wanted, lambda row: curves[row].number):
         shown += [str(number), *found]
     if not shown:

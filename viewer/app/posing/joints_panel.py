@@ -225,8 +225,11 @@ def _draw_dof(state: AppState, skeleton: Skeleton, pose: Pose, dof: int, label: 
         pause_for_edit(state)
     imgui.end_disabled()
     note_item(state, f"{label}.{name}")
-    limits = _limits_text(low, high, kind, state.in_degrees)
-    if is_reset(f"{label}.{name}\n{limits}") and not locked:
+    in_degrees = state.in_degrees
+    if (
+        is_reset(lambda: f"{label}.{name}\n{_limits_text(low, high, kind, in_degrees)}")
+        and not locked
+    ):
         value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
         why = f"locked at {_value_text(low, kind, state.in_degrees)}" if locked else ""
