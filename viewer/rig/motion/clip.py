@@ -292,15 +292,13 @@ def _hermite(table: _Table, times: Floats) -> Floats:
     u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
     p0, p1 = table.values[every, span], table.values[every, following]
     v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
-    return hermite(p0, p1, v0, v1, u)[0]
+    a, b = hermite(p0, p1, v0, v1)
+    return ((a * u + b) * u + v0) * u + p0
 
 
-def hermite(
-    p0: Floats, p1: Floats, v0: Floats, v1: Floats, u: Floats | float
-) -> tuple[Floats, Floats]:
-    """Return value and slope at u, 0 to 1, of the cubic with these values and slopes at 0 and 1."""
-    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
-    return ((a * u + b) * u + v0) * u + p0, (3.0 * a * u + 2.0 * b) * u + v0
+def hermite(p0: Floats, p1: Floats, v0: Floats, v1: Floats) -> tuple[Floats, Floats]:
+    """Return a, b of a u^3 + b u^2 + v0 u + p0 with values p0, p1 and slopes v0, v1 at 0 and 1."""
+    return 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
 
 
 def suits(clip: Clip, skeleton: Skeleton) -> bool:

@@ -81,7 +81,9 @@ def slope_at(channel: Channel, time: float) -> float:
     edges = slopes(channel)
     u = (time - times[key]) / h
     p0, p1 = channel.values[key], channel.values[key + 1]
-    return float(hermite(p0, p1, h * edges[key, 1], h * edges[key + 1, 0], u)[1] / h)
+    v0, v1 = h * edges[key, 1], h * edges[key + 1, 0]
+    a, b = hermite(p0, p1, v0, v1)
+    return float(((3.0 * a * u + 2.0 * b) * u + v0) / h)
 
 
 def move_keys(

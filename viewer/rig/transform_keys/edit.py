@@ -345,8 +345,8 @@ def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
     h = float(times[key + 1] - times[key])
     u = (time - float(times[key])) / h
     m0, m1 = h * channel.tangents[key, 1], h * channel.tangents[key + 1, 0]
-    value, slope = hermite(values[key], values[key + 1], m0, m1, u)
-    return value, slope / h
+    a, b = hermite(values[key], values[key + 1], m0, m1)
+    return ((a * u + b) * u + m0) * u + values[key], ((3.0 * a * u + 2.0 * b) * u + m0) / h
 
 
 def _without_keys(channel: TransformChannel, keys: Iterable[int]) -> TransformChannel | None:
