@@ -181,12 +181,11 @@ def _faulty_rows(
     held = _held_frames(source, words, width, declared)
     if held is not None:
         return held
-    values, bad = parse_numbers(source.data, start, len(source.data), is_kept=False)
+    bad = int(words.bad[0]) if len(words.bad) else -1
+    values = words.values[:bad] if bad >= 0 else words.values
     whole, rest = divmod(len(values), width)
     if bad >= 0:
-        offset = source.word_offset(start, bad)
-        match = source.next_word(offset)
-        word = b"" if match is None else match.group()
+        offset, word = int(words.offsets[bad]), words.word(bad)
         if declared is None or bad < declared * width:
             frame = Phrase("frame {frame}", frame=bad // width)
             raise source.fault(number_key(word), offset, item=frame, found=quoted(word))
