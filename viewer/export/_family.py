@@ -16,8 +16,8 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import SignedUp
+from viewer.rig.geometry.rotation import quarter_turn, rotation_vector_to_matrix
+from viewer.rig.geometry.vectors import SIGNED_UPS, SignedUp
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
 from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
@@ -89,11 +89,11 @@ def check_unit(options: ExportOptions, title: str) -> None:
 
 
 def up_axis(options: ExportOptions) -> SignedUp:
-    """Return the up axis of the file, y or z: the requested one, else that of the scene."""
+    """Return the up axis of the file: the requested one, y or z, or else that of the scene."""
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
     up = options.up or options.world_up
-    if up not in ("y", "z", "-y", "-z"):
+    if up not in SIGNED_UPS:
         raise RigError(f'up axis: expected y or z, found "{up}"')
     return up
 
@@ -118,7 +118,7 @@ def family_frames(
     if up_axis(options) != options.world_up:
         # For another up axis the world is rotated by Q about x: R' = Q R, and as the root moves
         # from t + J0 to Q (t + J0) while J0 stays, t' = Q (t + J0) - J0.
-        rotation = _quarter_turn(up_axis(options))
+        rotation = quarter_turn(up_axis(options))
         rotations = rotations.copy()
         rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
         # A rotation by 90 degrees has integer entries.
@@ -248,13 +248,8 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
     if up_axis(options) == options.world_up:
         return found
-    back = -_quarter_turn(up_axis(options))
+    back = -quarter_turn(up_axis(options))
     return rotated_frames(figure, found, rotation_vector_to_quaternion(back))
-
-
-def _quarter_turn(up: SignedUp) -> Floats:
-    """Return the rotation vector about x from the other up axis, y or z, to ``up``."""
-    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 
 
 def padded(rows: Floats, fewest: int) -> Floats:

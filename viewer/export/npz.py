@@ -38,8 +38,7 @@ from viewer.rig.arrays import Arrays, Bools, Deferred, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import SignedUp
+from viewer.rig.geometry.rotation import quarter_turn, rotation_vector_to_matrix
 from viewer.rig.motion.evaluation import pose_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
 from viewer.rig.posing.pose_vector import write_vector
@@ -103,7 +102,7 @@ def _export_frames(
     frames, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     skeleton = figure.require_skeleton()
     if up != options.world_up:
-        frames = rotated_frames(figure, frames, rotation_vector_to_quaternion(_turn(up)))
+        frames = rotated_frames(figure, frames, rotation_vector_to_quaternion(quarter_turn(up)))
     world = world_frames(figure, frames)
     world[~frames.present] = np.nan
     order = [options.quaternions.index(part) for part in "xyzw"]
@@ -148,7 +147,7 @@ def _motion_losses(
     figure, frames, up = animation.figure, animation.frames, options.up or options.world_up
     turned = np.eye(3)
     if up != options.world_up:
-        turned = np.round(rotation_vector_to_matrix(_turn(up)))
+        turned = np.round(rotation_vector_to_matrix(quarter_turn(up)))
     vertices, joints = _read(again, "vertices"), _read(again, "joints")
     losses = PoseLosses(figure, options.skinning)
     for frame in np.flatnonzero(frames.present).tolist():
@@ -174,7 +173,7 @@ def _export_points(
     _check("", options)
     up, points = options.up or options.world_up, animation.points
     if up != options.world_up:
-        points = points @ np.round(rotation_vector_to_matrix(_turn(up))).T
+        points = points @ np.round(rotation_vector_to_matrix(quarter_turn(up))).T
     arrays: Arrays = {
         "name": np.array(animation.name),
         "up": np.array(up),
@@ -194,11 +193,6 @@ def _export_points(
             names=all_of([*arrays]),
         )
     ]
-
-
-def _turn(up: SignedUp) -> Floats:
-    """Return the rotation vector from the other up axis, y or z, to ``up``."""
-    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 
 
 def _check(unit: str, options: ExportOptions) -> None:

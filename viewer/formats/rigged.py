@@ -49,7 +49,7 @@ from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
 from viewer.phrases import counted, optional, quoted
 from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Bytes, Deferred, Floats, Ints
+from viewer.rig.arrays import Arrays, Bytes, Deferred, Floats, Ints
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
@@ -412,7 +412,7 @@ def save(
     save_arrays(path, {**figure_arrays(figure), **(more or {})})
 
 
-def figure_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
+def figure_arrays(figure: Figure) -> Arrays:
     """Return the arrays of a rigged figure by key, as in the file; correctives are float32."""
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     if mesh is None or skeleton is None or skin is None:
@@ -450,7 +450,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
     return {key: array for key, array in arrays.items() if array is not None}
 
 
-def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
+def _mesh_arrays(mesh: Mesh) -> Arrays:
     """Return the arrays of a mesh with its materials; normals are not stored."""
     arrays: dict[str, NDArray[np.generic] | None] = {
         "positions": mesh.positions,
@@ -466,11 +466,11 @@ def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     return found | _material_arrays(mesh)
 
 
-def _material_arrays(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
+def _material_arrays(mesh: Mesh) -> Arrays:
     """Return the arrays that describe a mesh's materials; an empty dict if it has no material."""
     if not mesh.materials:
         return {}
-    arrays: dict[str, NDArray[np.generic]] = {
+    arrays: Arrays = {
         "material_names": np.array([material.name for material in mesh.materials]),
         "material_textures": np.array([material.texture or "" for material in mesh.materials]),
         "triangle_materials": mesh.material_indices,

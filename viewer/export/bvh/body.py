@@ -22,6 +22,7 @@ from viewer.export.bvh.angles import euler_angles
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hierarchy import roots_of
 from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.motion.evaluation import Frames, rest_translations_of, world_frames
 from viewer.rig.pose import zero_pose
@@ -130,10 +131,7 @@ def _positions(
     fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
     places = world_frames(figure, fixed)[..., :3, 3]
     if len(frames.shape_weights) > 1 or (frames.figure_scales != scale).any():
-        roots = np.arange(len(parents), dtype=np.int32)
-        for joint, parent in enumerate(parents):
-            if parent >= 0:
-                roots[joint] = roots[parent]
+        roots = roots_of(parents)
         rest = rest_translations_of(figure, frames.shape_weights)
         own = rest[:, roots] + frames.translations[:, roots]
         own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]

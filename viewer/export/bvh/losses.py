@@ -111,16 +111,11 @@ class FileLosses:
 
         def poses(rows: Rows) -> Poses:
             again = frames_of(read, clip, rows / clip.timing.frame_rate)
-            if body is None:
-                found = world_frames(read, again)[:, order][..., :3, 3]
-                places = found @ space.world / space.factor
-                return bare_poses(places, frames_between(frames, rows))
             found = world_frames(read, again)[:, order]
-            world = affine_matrices(
-                space.world.T @ found[..., :3, :3] @ own,
-                found[..., :3, 3] @ space.world / space.factor,
-            )
-            places = world[..., :3, 3].copy()
+            places = found[..., :3, 3] @ space.world / space.factor
+            if body is None:
+                return bare_poses(places, frames_between(frames, rows))
+            world = affine_matrices(space.world.T @ found[..., :3, :3] @ own, places)
             shifts = frames_between(frames, rows).figure_translations
             world[..., :3, 3] -= shifts[:, None]
             corrective_rotations = np.zeros((len(rows), 0))

@@ -53,7 +53,8 @@ class Sparse:
     indices: NDArray[np.integer]
     """(N,): stored values, and the row (csc, coo) or column (csr) of each."""
     indptr: NDArray[np.integer]
-    """Start of each column (csc) or row (csr) in ``data``, and its end; columns of values (coo)."""
+    """Starts of the columns (csc) or rows (csr) in ``data`` and the end of the last: (columns + 1,)
+    or (rows + 1,). The column of each value (coo): (N,)."""
     layout: str
     """``"csc"``, ``"csr"`` or ``"coo"``."""
 
