@@ -79,7 +79,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
 def write_poses(
     selection: Selection, path: Path, options: ExportOptions, extend: _Extend | None = None
 ) -> list[Diagnostic]:
-    """Write figures posed, or at rest with their animations; ``extend`` adds those of VRM."""
+    """Write figures posed, or at rest with animations; ``extend`` adds a VRM character's data."""
     scene, actors, skinning = selection.scene, selection.actors, options.skinning
     clips = [part.clips for part in selection.parts]
     document = Document(actors[0].figure.name)

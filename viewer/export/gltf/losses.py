@@ -165,7 +165,11 @@ def read_back(
     start: int = 0,
     sets: int | None = None,
 ) -> Side:
-    """Return the contents of a file in a form that can be compared with the figure."""
+    """Return the contents of a file in a form that can be compared with the figure.
+
+    ``targets`` (M,): the figure's morph targets that change. ``start``: the figure's frame that is
+    the first of the file. ``sets``: influence sets that are used, normalised; all if None.
+    """
     parents, n_joints = file.tree.parents, len(tree.joints)
     bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
     joints = [*tree.joints, file.tree.n_nodes if tree.place < 0 else tree.place]

@@ -19,6 +19,7 @@ from viewer.rig.skin import (
     has_influence,
     influence_counts,
     limit_influences,
+    owners,
     skin_from_entries,
     weight_sums,
 )
@@ -54,20 +55,20 @@ class Influences:
 def influences_of(skin: Skin) -> Influences:
     """Return a skin in the form that glTF can store."""
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
-    owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
+    vertices = owners(merged)
     positive = np.maximum(merged.weights, 0.0)
-    sums = np.bincount(owners, positive, skin.n_vertices)[owners]
+    sums = np.bincount(vertices, positive, skin.n_vertices)[vertices]
     weights = np.divide(positive, sums, out=np.zeros_like(positive), where=sums > 0.0)
     kept = weights.astype(np.float32) > 0.0
     written = skin_from_entries(
-        skin.n_vertices, owners[kept], merged.joints[kept], weights[kept], skin.inverse_bind
+        skin.n_vertices, vertices[kept], merged.joints[kept], weights[kept], skin.inverse_bind
     )
     counts = influence_counts(written)
     scaled = has_influence(skin) & (np.abs(weight_sums(skin) - 1.0) > _SUM)
     found = Influences(
         written,
         int(scaled.sum()),
-        len(np.unique(owners[merged.weights < 0.0])),
+        len(np.unique(vertices[merged.weights < 0.0])),
         int((counts == 0).sum()),
         int(counts.max(initial=0)),
     )

@@ -33,7 +33,7 @@ _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "L
 
 
 def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
-    """Return a figure in metres, y up, on the ground, with its shape baked in and without DOFs."""
+    """Return a figure in VRM's axes and unit, without DOFs; a shape that moves joints is baked."""
     shapes = figure.blend_shapes
     if figure.joint_regressor is not None and shapes is not None:
         figure, shapes = shaped(figure, pose.shape_weights), None

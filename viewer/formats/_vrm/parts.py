@@ -39,7 +39,7 @@ _LARGEST = 1e6
 
 
 def value_of(told: object, default: float) -> float | None:
-    """Return a number; the default if it is missing, None if it is not finite or no number."""
+    """Return a number; the default if it is missing, None if it is no number below 1e6 in size."""
     if told is None:
         return default
     if not isinstance(told, int | float) or isinstance(told, bool):

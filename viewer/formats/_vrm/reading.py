@@ -18,7 +18,7 @@ from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.materials import modern_binds
 from viewer.formats._vrm.parts import is_index, list_in, part, value_of
 from viewer.formats._vrm.springs import read_springs
-from viewer.formats._vrm.upgrade import NamedExpression, upgrade
+from viewer.formats._vrm.upgrade import NamedExpression, nodes_with_mesh, upgrade
 from viewer.phrases import listed, quoted
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
@@ -190,8 +190,7 @@ def _read_part_views(
         view = part(each, "firstPersonFlag" if version == 0 else "type")
         known = _VIEWS.get(view.lower()) if isinstance(view, str) else None
         if version == 0:
-            mesh = part(each, "mesh")
-            nodes = file.tree.with_mesh(mesh) if is_index(mesh, len(file.meshes)) else []
+            nodes = nodes_with_mesh(file, part(each, "mesh"))
         else:
             node = part(each, "node")
             has_mesh = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0

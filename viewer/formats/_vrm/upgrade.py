@@ -17,7 +17,7 @@ from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.materials import modern_toon, upgraded_binds
-from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
+from viewer.formats._vrm.parts import is_index, list_in, objects_in, part, rows_of, value_of
 from viewer.formats._vrm.springs import end_below
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import OLD_PRESETS
@@ -72,7 +72,7 @@ class NamedExpression:
     name: str
     """As the file states it."""
     preset: str
-    """Its preset if an expression of version 0.x states one, as its name says it otherwise."""
+    """Preset of VRM 1.0 that an expression of version 0.x states; empty if none, and in 1.0."""
     told: Json
     """As in ``VRMC_vrm``; a bind whose mesh or weight is invalid lacks its node or weight."""
     undrawn: list[str]
@@ -106,7 +106,8 @@ def upgrade(file: NodeFile, source: Source) -> Upgrade:
     views = []
     for each in list_in(data, "firstPerson", "meshAnnotations"):
         view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
-        views += [{"node": node, "type": view} for node in _with_mesh(file, part(each, "mesh"))]
+        nodes = nodes_with_mesh(file, part(each, "mesh"))
+        views += [{"node": node, "type": view} for node in nodes]
     character |= {"firstPerson": {"meshAnnotations": views}} if views else {}
     character |= _gaze(data, lost)
     expressions = _expressions(data, file)
@@ -141,7 +142,7 @@ def _humanoid(data: object, lost: list[str]) -> Json:
     return {"humanBones": bones}
 
 
-def _with_mesh(file: NodeFile, mesh: object) -> list[int]:
+def nodes_with_mesh(file: NodeFile, mesh: object) -> list[int]:
     """Return the nodes that show a mesh; none if it is not an index."""
     return file.tree.with_mesh(mesh) if is_index(mesh, len(file.meshes)) else []
 
@@ -203,7 +204,7 @@ def _meta(data: object, textures: StoredTextures | None, lost: list[str]) -> Jso
     meta |= _licence(texts)
     listed, texture = () if textures is None else textures.textures, given.get("texture")
     image = None
-    if isinstance(texture, int) and is_index(texture, len(listed)):
+    if is_index(texture, len(listed)):
         image = part(listed[texture], "source")
     if isinstance(image, int):
         meta["thumbnailImage"] = image
@@ -238,9 +239,7 @@ def _expressions(data: object, file: NodeFile) -> list[NamedExpression]:
     """Return the expressions, whose binds name nodes instead of meshes."""
     found = []
     materials = list_in(data, "materialProperties")[: len(file.materials)]
-    for each in list_in(data, "blendShapeMaster", "blendShapeGroups"):
-        if not isinstance(each, dict):
-            continue
+    for _, each in objects_in(data, "blendShapeMaster", "blendShapeGroups"):
         told: Json = {"isBinary": each.get("isBinary") is True}
         binds = [bind for bound in list_in(each, "binds") for bind in _binds(bound, file)]
         told |= {"morphTargetBinds": binds} if binds else {}
@@ -257,7 +256,7 @@ def _binds(told: object, file: NodeFile) -> list[Json]:
     weight = None if given is None else value_of(given, 0.0)
     bind = {"index": part(told, "index")}
     bind |= {} if weight is None else {"weight": weight / _PERCENT}
-    nodes = _with_mesh(file, part(told, "mesh"))
+    nodes = nodes_with_mesh(file, part(told, "mesh"))
     return [{"node": node, **bind} for node in nodes] or [bind]
 
 

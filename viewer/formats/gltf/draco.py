@@ -28,7 +28,10 @@ class DecodedPrimitive:
 
 
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
-    """Return a decoded primitive; None if it is stored without Draco and DracoPy is missing."""
+    """Return a decoded primitive, or None.
+
+    None without the extension, or if DracoPy is missing and the file does not require Draco.
+    """
     extension = primitive.extension(_NAME) if primitive.has("extensions") else None
     if extension is None:
         return None

@@ -166,9 +166,9 @@ def stored_toon(document: Document) -> dict[int, Json]:
     """Return the toon and unlit extensions of the materials, by index, as parsed from JSON."""
     found = {}
     for index, material in enumerate(list_in(document.root.values, "materials")):
-        extensions = material.get("extensions") if isinstance(material, dict) else None
-        given = extensions if isinstance(extensions, dict) else {}
-        found[index] = {name: given[name] for name in _KEPT if isinstance(given.get(name), dict)}
+        given = part(material, "extensions")
+        kept = {name: part(given, name) for name in _KEPT}
+        found[index] = {name: told for name, told in kept.items() if isinstance(told, dict)}
     return found
 
 
