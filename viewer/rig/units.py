@@ -28,7 +28,10 @@ def is_metres(size: float) -> bool:
 
 
 def unit_of_scaled(unit: str, scale: float) -> str:
-    """Return the unit of a figure ``scale`` times as long as one in ``unit``; empty if unclear."""
+    """Return the unit in which a figure is about as long as a similar one; empty if unclear.
+
+    ``scale``: its length over that of the similar figure, which is in ``unit``, each in its own.
+    """
     if unit not in METRES:
         return ""
     # Inches are too close to centimetres to be distinguished by size.

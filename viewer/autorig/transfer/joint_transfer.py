@@ -9,7 +9,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.geometry.closest_point import Surface
-from viewer.rig.skin import Skin, influence_counts
+from viewer.rig.skin import Skin, owners
 
 _ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
 _SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees
@@ -47,9 +47,8 @@ def surface_shifts(
 def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     """Return a regressor b_v = w_vj w_v,parent of vertices with both joints; rows may be empty."""
     # A root uses the boundary with its children. Rows are not normalised.
-    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
     count = skin.n_joints
-    keys = owners * count + skin.joints
+    keys = owners(skin).astype(np.int64) * count + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     weights = np.bincount(inverse.reshape(-1), skin.weights, minlength=len(unique))
     vertices, joints = unique // count, unique % count

@@ -15,7 +15,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.geometry.vectors import Up
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose, zero_pose
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
@@ -120,13 +120,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
         return offsets  # the template is not symmetric, so there is no symmetry to preserve
     flip = np.ones(3)
     flip[mirror_axis(template)] = -1.0
-    zero = Pose(
-        dofs=np.zeros(skeleton.n_dofs),
-        translations=np.zeros((skeleton.n_joints, 3)),
-        rotations=skeleton.rest_rotations.copy(),
-        scales=skeleton.rest_scales.copy(),
-    )
-    rest = world_matrices(skeleton, zero)[:, :3, :3]
+    rest = world_matrices(skeleton, zero_pose(skeleton))[:, :3, :3]
     has_parent = skeleton.parents >= 0
     frames = np.where(has_parent[:, None, None], rest[skeleton.parents], np.eye(3))
     # The averaged values are changes from the scaled template, in its rest axes.

@@ -29,7 +29,7 @@ HOLLOW = 1e-6
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
-    """Return triangles with vertices at equal positions merged, so that seams are closed."""
+    """Replace each vertex index, in any shape, by the first one at the same position: no seams."""
     # Sorting rows as three keys is several times faster than np.unique over rows.
     order = np.lexsort(positions.T)
     ordered = positions[order]

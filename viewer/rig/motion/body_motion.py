@@ -14,7 +14,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Floats, freeze, freeze_fields, frozen
+from viewer.rig.arrays import Floats, freeze, freeze_fields
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.coefficients import apply_coefficients, space_misfit, unused_coefficients
 from viewer.rig.figure import Figure
@@ -69,7 +69,7 @@ class BodyMotion:
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+                freeze_fields(self, **{name: shape})
 
         put("vectors", (None, len(self.joint_names), 3))
         put("translations", (len(self.vectors), 3))

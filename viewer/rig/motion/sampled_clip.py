@@ -10,7 +10,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.samples import Samples, joint_samples
@@ -48,7 +48,7 @@ class SampledClip:
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+                freeze_fields(self, **{name: shape})
 
         put("rotations", (None, None, 4))
         put("translations", (*self.rotations.shape[:2], 3))
