@@ -13,31 +13,23 @@ from viewer.app.closing import request_quit
 from viewer.app.core.actions import Action, Shortcut, given
 from viewer.app.core.reasons import (
     no_drive,
-    no_job_room,
     no_mesh,
-    no_new_clip,
     no_panel,
     no_parts,
-    no_pose,
     no_skeleton,
-    nothing_to_export,
 )
 from viewer.app.core.state import AppState
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import key_name
-from viewer.app.curves.editing import new_clip
 from viewer.app.files.files import ask_for_files, open_bundled_body, open_bundled_figure
-from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.keys import cancel, toggle_keys, toggle_messages, toggle_panels, want_screenshot
 from viewer.app.layout import PANELS, reset_layout, show_panel
-from viewer.app.linting.lint_panel import check_rig
-from viewer.app.menus import ask_for_export
+from viewer.app.menus import CHECK, EXPORTS, NEW_CLIP
 from viewer.app.palette import Entry, toggle_palette
 from viewer.app.playback.animations import choose_animation, step_animation
 from viewer.app.playback.timeline_panel import go_to_end, play, range_in, range_out, step
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import (
-    ask_for_pose,
     copy_numbers,
     copy_pose,
     mirror,
@@ -49,7 +41,6 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.posing.toolbar import choose_tool, key_pose_now, next_orientation, no_keys
 from viewer.app.preferences.preferences_window import open_preferences
-from viewer.app.recording.recording import open_record_dialog
 from viewer.app.retargeting.drive_changes import no_edit, toggle_feet
 from viewer.app.retargeting.joint_match_panel import (
     ask_for_map,
@@ -148,12 +139,9 @@ KEYS = (
 ACTIONS = (
     Action("Open the bundled figure", open_bundled_figure),
     Action("Open the bundled body", open_bundled_body),
-    Action("Save pose…", ask_for_pose, no_pose),
-    Action("Export…", ask_for_export, no_job_room),
-    Action("Export motion…", ask_for_motion, nothing_to_export),
-    Action("Record pictures or video…", open_record_dialog, no_job_room),
-    Action("Check the rig", check_rig, no_job_room),
-    Action("New clip", new_clip, no_new_clip),
+    *EXPORTS,
+    CHECK,
+    NEW_CLIP,
     Action("Key the pose at the current time", key_pose_now, no_keys),
     Action("Reset the pose of this actor", reset_actor),
     Action("Reset shape", reset_shape),

@@ -76,9 +76,9 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
     for other in PANELS.values():
-        window = None
-        if other.place == panel.place and other is not panel:
-            window = imgui.internal.find_window_by_name(other.title)
+        if other.place != panel.place or other is panel:
+            continue
+        window = imgui.internal.find_window_by_name(other.title)
         if window is not None and window.dock_id:
             # A panel that is missing from the stored layout would float over its neighbours.
             imgui.set_next_window_dock_id(window.dock_id, imgui.Cond_.first_use_ever)

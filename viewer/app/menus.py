@@ -134,7 +134,7 @@ _BUNDLED = (
     Action("Bundled figure", open_bundled_figure),
     Action("Bundled body", open_bundled_body),
 )
-_SAVING = (
+EXPORTS = (
     Action("Save pose…", ask_for_pose, no_pose),
     Action("Export…", ask_for_export, no_job_room),
     Action(
@@ -143,21 +143,24 @@ _SAVING = (
         lambda state: nothing_to_export(state) or no_job_room(state),
     ),
     Action("Record pictures or video…", open_record_dialog, no_job_room),
-    Action("Save screenshot", want_screenshot, key="F12"),
 )
+"""Actions that write files."""
+CHECK = Action("Check the rig", check_rig, no_job_room)
+NEW_CLIP = Action("New clip", new_clip, no_new_clip)
+_SAVING = (*EXPORTS, Action("Save screenshot", want_screenshot, key="F12"))
 _EDITING = (
     (Action("Undo", undo, no_undo, "Ctrl+Z"), Action("Redo", redo, no_redo, "Ctrl+Shift+Z")),
     (
         Action("Reset pose", reset_pose, key="R"),
         Action("Mirror pose", mirror, no_pose, "M"),
-        Action("New clip", new_clip, no_new_clip),
+        NEW_CLIP,
         Action("Copy pose", copy_pose, no_pose, "Ctrl+C"),
         Action("Copy pose as raw values", copy_numbers, no_pose, "Ctrl+Shift+C"),
         Action("Paste pose", paste_pose, no_pose, "Ctrl+V"),
     ),
     (
         Action("Find an action…", toggle_palette, key="Ctrl+P"),
-        Action("Check the rig", check_rig, no_job_room),
+        CHECK,
     ),
     (Action("Preferences…", open_preferences, key="Ctrl+,"),),
 )

@@ -49,7 +49,11 @@ _SEPARATOR = imgui.Key.gamepad_back
 
 
 class Shell:
-    """Window that shows the progress of opening files, and then the files."""
+    """Window that shows the progress of opening files, and then the files.
+
+    ``scale``: of the interface; the preferred one, or that of the monitor, if omitted. Raises
+    ``RenderError`` without usable OpenGL.
+    """
 
     def __init__(self, title: str, scale: float | None = None) -> None:
         self.problems: list[str] = []

@@ -284,7 +284,7 @@ def draw_setting(
     facts, value = settings.__dataclass_fields__[name].metadata, getattr(settings, name)
     with disabled(state, why):
         if isinstance(value, bool):
-            new: object = checkbox(state, label, value, why)
+            new: object = checkbox(state, label, value)
         elif "choices" in facts:
             new = choice(state, label, value, facts["choices"])
         elif isinstance(value, int):

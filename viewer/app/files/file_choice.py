@@ -42,9 +42,9 @@ class FileDialog:
     """Returns all files that are written for a name; if omitted, only the named file is written."""
     is_single: bool = False
     """Whether only one file can be chosen."""
-    suffix: str = ""
+    suffix: str = field(default="", init=False)
     """Suffix that is added to a name without one."""
-    suggested: str = ""
+    suggested: str = field(default="", init=False)
     """Name that was suggested first."""
     chosen: set[Path] = field(default_factory=set)
     current: Path | None = None

@@ -12,7 +12,6 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_drive
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState, shows_errors
-from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import WARNING, faint, ink
 from viewer.app.core.widgets import (
     button,
@@ -255,8 +254,7 @@ def _draw_choice(state: AppState, shown: _Shown, joint: int, partner: int) -> No
     if imgui.is_window_appearing():
         view.source_filter = ""
         imgui.set_keyboard_focus_here()
-    imgui.set_next_item_width(-1.0)
-    view.source_filter = search_field("##source filter", view.source_filter, "Filter joints")
+    view.source_filter = filter_field(state, "source filter", view.source_filter, "Filter joints")
     if imgui.selectable(_AT_REST, partner < 0)[0]:
         match_joint(state, joint, -1)
     note_item(state, f"source {_AT_REST}")
