@@ -96,7 +96,7 @@ class Subject:
         return f"{rounded(length)} units" + self._relative(length)
 
     def speed(self, speed: float, is_limit: bool = False) -> str:
-        """Return a speed in metres per second if the unit is known, else a multiple of the size."""
+        """Return a speed in m/s, else in units and, unless a limit, in sizes per second."""
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{rounded(speed * METRES[unit])} m/s"

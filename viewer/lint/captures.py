@@ -12,7 +12,7 @@ from viewer.lint._subject import Subject
 from viewer.lint.clips import missing_frames
 from viewer.phrases import all_of, counted, listed, rounded
 from viewer.rig.arrays import Ints
-from viewer.rig.captures.points import PointClip, visible_sizes
+from viewer.rig.captures.points import PointClip, visible_size
 
 LOW_FRACTION = 0.05
 """Fraction of a keypoint's visible frames: this much low confidence is normal."""
@@ -108,7 +108,7 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> Iterator[Find
     speeds = steps * clip.timing.frame_rate
     limit = subject.options.max_speed
     if limit is None:
-        limit = _SIZES * _size(clip)
+        limit = _SIZES * visible_size(clip.points)
     fastest = speeds.max(axis=1)
     wrong = np.flatnonzero(fastest > limit)
     if len(wrong) == 0:
@@ -136,9 +136,3 @@ def _n_frames(rows: Ints) -> int:
     """Return the number of frames from the first to the last in which the person is present."""
     there = np.flatnonzero(rows >= 0)
     return int(there[-1] - there[0]) + 1 if len(there) else 0
-
-
-def _size(clip: PointClip) -> float:
-    """Return the median size of the bounding box of the visible points in a frame."""
-    sizes = visible_sizes(clip.points)
-    return float(np.median(sizes)) if len(sizes) else 1.0

@@ -23,6 +23,7 @@ from viewer.rig.feet.contacts import (
 from viewer.rig.feet.ground import Ground, ground_under, resting_frames
 from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.skeleton import joint_labels
 
 
@@ -35,7 +36,6 @@ def check(subject: Subject) -> Iterator[Finding]:
     feet = track.feet.tolist()
     if len(feet) < 2:
         return
-    up = 2 if subject.up == "z" else 1
     height, heights = extent(figure)[1], track.soles
     given = subject.options.ground
     ground, sinks = 0.0, limits.SINKS
@@ -51,7 +51,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
     yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height)
     yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
-    yield from _slipped(subject, track, feet, labels, heights - ground, up)
+    yield from _slipped(subject, track, feet, labels, heights - ground)
 
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
@@ -155,13 +155,13 @@ def _slipped(
     feet: list[int],
     labels: list[str],
     heights: Floats,
-    up: int,
 ) -> Iterator[Finding]:
     """Report a foot that slides along the ground, where feet do not stand."""
     if track.body <= 0.0:  # legs without a length
         return
     step = float(track.times[1] - track.times[0])
-    paths, how = list(track.paths), (runs_of(track.present), 1.0 / step, track.body, np.eye(3)[up])
+    paths = list(track.paths)
+    how = runs_of(track.present), 1.0 / step, track.body, axis_vector(subject.up)
     velocity = ground_velocity(paths, *how)
     if velocity is not None:  # a motion in place: standing feet move with the ground
         paths = on_moving_ground(paths, (track.times[0] - track.times)[:, None] * velocity)

@@ -10,7 +10,7 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, track_of
 from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip, visible_sizes
+from viewer.rig.captures.points import PointClip, visible_size
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.skeleton import joint_labels
 
@@ -59,8 +59,7 @@ def _points(subject: Subject, clip: PointClip) -> Iterator[Finding]:
         return
     rows = clip.points[np.maximum(timing.rows, 0)]
     seen = (rows[..., 3] > 0.0) & timing.present[:, None]
-    sizes = visible_sizes(rows[timing.present])
-    limit = _POINT_LIMIT * float(np.median(sizes)) if len(sizes) else 0.0
+    limit = _POINT_LIMIT * visible_size(rows[timing.present])
     width = _width(timing.frame_rate)
     noise = np.zeros(seen.shape)
     for point in range(seen.shape[1]):

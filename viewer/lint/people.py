@@ -12,7 +12,7 @@ from viewer.lint._subject import Subject
 from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.points import visible_sizes
+from viewer.rig.captures.points import visible_size
 from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, rest_translations_of
@@ -151,8 +151,7 @@ def _path(actor: Actor) -> _Path | None:
         present = clip.timing.present & seen.any(axis=(1, 2))
         count = np.maximum(seen.sum(axis=1), 1)
         means = np.where(seen, points[..., :3], 0.0).sum(axis=1) / count
-        sizes = visible_sizes(points[present])
-        size = float(np.median(sizes)) if len(sizes) else 0.0
+        size = visible_size(points[present])
         return _Path(clip.timing, present, means @ turn.T + place, scale * size)
     if clip is None or figure.skeleton is None:
         return None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.transform import affine_matrices
-from viewer.rig.pose import Pose, PosedSkeleton, joint_rotations, local_transforms
+from viewer.rig.pose import Pose, PosedSkeleton, joint_rotations, local_transforms, zero_pose
 from viewer.rig.skeleton import Skeleton
 
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
@@ -63,6 +63,11 @@ def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
 def world_rotations(parents: Ints, local: Floats) -> Floats:
     """Concatenate rotations (J, 3, 3) of one pose down the hierarchy."""
     return forward_kinematics(parents, local[:, None])[:, 0]
+
+
+def rest_world_rotations(skeleton: Skeleton) -> Floats:
+    """Return the world rotations of all joints with DOFs at 0: (J, 3, 3)."""
+    return world_rotations(skeleton.parents, joint_rotations(skeleton, zero_pose(skeleton)))
 
 
 def _passes(parents: Ints) -> Iterator[tuple[Indices, Indices]]:

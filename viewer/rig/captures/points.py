@@ -86,10 +86,11 @@ class PointClip:
         return Samples(present, points=np.where(both[..., None], mixed, start))
 
 
-def visible_sizes(points: Floats) -> Floats:
-    """Return the diagonal of the box of visible points (F, K, 4) in each frame that has any."""
+def visible_size(points: Floats) -> float:
+    """Return the median diagonal of the boxes of visible points (F, K, 4); 0 if there are none."""
     seen = points[..., 3:] > 0.0
     low = np.where(seen, points[..., :3], np.inf).min(axis=1)
     high = np.where(seen, points[..., :3], -np.inf).max(axis=1)
     known = seen.any(axis=(1, 2))
-    return np.linalg.norm(high[known] - low[known], axis=1)
+    sizes = np.linalg.norm(high[known] - low[known], axis=1)
+    return float(np.median(sizes)) if len(sizes) else 0.0

@@ -59,9 +59,10 @@ def leg_rotations(
     drop: Floats,
     shifts: Sequence[Floats],
 ) -> Floats:
-    """Return local rotations (N, J, 4) that bring ankles to their targets; feet keep their world's.
+    """Return local rotations (N, J, 4) that bring ankles to their targets.
 
-    ``drop`` (N, 3) translates the body; ``shifts``, (N, 3) a leg, the ankles instead of ``drop``.
+    Feet keep their world rotations. ``drop`` (N, 3) translates the body; ``shifts``, (N, 3) a leg,
+    the ankles instead of ``drop``.
     """
     result = rotations.copy()
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]

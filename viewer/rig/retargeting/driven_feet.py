@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import Remedy, counted
 from viewer.progress import report
 from viewer.rig.arrays import Floats
@@ -150,17 +150,17 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
             else "F007.feet-no-contacts: feet of {figure} not planted: no ground contacts found in "
             "{motion}"
         )
-        return [Diagnostic(key, values=called)]
+        return [note(key, **called)]
 
     def text(length: float) -> str:
         return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
 
     notes: list[Diagnostic] = []
 
-    def note(key: str, **values: object) -> None:
-        notes.append(Diagnostic(key, values=values))
+    def add(key: str, **values: object) -> None:
+        notes.append(note(key, **values))
 
-    note(
+    add(
         "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after} "
         "instead of {before} ({source} in {motion}); {remedy} disables this",
         **called,
@@ -170,7 +170,7 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         after=text(changes.after),
         remedy=Remedy("Feet on the ground in the Actors panel", "--feet off"),
     )
-    note(
+    add(
         "F007.feet-gap: soles of {figure} are at most {gap} from the ground during "
         "contacts, instead of {gap_before}",
         figure=figure.name,
@@ -178,14 +178,14 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         gap=text(changes.gap_after),
     )
     if changes.lowered > _ROUNDING * changes.size:
-        note(
+        add(
             "F007.feet-lowered: {figure} is lowered by up to {length}, so that its feet reach "
             "the ground",
             figure=figure.name,
             length=text(changes.lowered),
         )
     if changes.ground_speed:
-        note(
+        add(
             "F007.feet-ground: ground moves at {speed}, as on a treadmill: planted feet of "
             "{figure} move with it",
             figure=figure.name,

@@ -10,9 +10,9 @@ from viewer.diagnostics import Phrase, note
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_rotations
+from viewer.rig.kinematics import rest_world_rotations, world_rotations
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, joint_rotations, zero_pose
+from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.shape import rest_joints
@@ -149,7 +149,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     partners = np.where(is_alone, np.arange(skeleton.n_joints), partners)
     flip = np.ones(3)
     flip[mirror_axis(figure)] = -1.0
-    rest = world_rotations(skeleton.parents, joint_rotations(skeleton, zero_pose(skeleton)))
+    rest = rest_world_rotations(skeleton)
     present = joint_rotations(skeleton, pose)
     posed = world_rotations(skeleton.parents, present)
     # F D F with F = diag(flip) is a proper rotation again: the two reflections cancel out.

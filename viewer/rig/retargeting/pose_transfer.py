@@ -34,7 +34,7 @@ from viewer.rig.geometry.rotation import (
     up_rotation,
 )
 from viewer.rig.geometry.vectors import Up, axis_vector
-from viewer.rig.kinematics import world_matrices, world_rotations
+from viewer.rig.kinematics import rest_world_rotations, world_matrices, world_rotations
 from viewer.rig.pose import Pose, joint_rotations, zero_pose
 from viewer.rig.posing.joint_rotation import nearest_dofs
 from viewer.rig.retargeting.joint_names import joint_meanings
@@ -76,7 +76,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
     """Return the joint rotations of a posed figure."""
     skeleton = figure.require_skeleton()
     relative = world_rotations(skeleton.parents, joint_rotations(skeleton, pose)) @ np.swapaxes(
-        world_rotations(skeleton.parents, joint_rotations(skeleton, zero_pose(skeleton))), 1, 2
+        rest_world_rotations(skeleton), 1, 2
     )
     return JointRotations(
         figure.name,
@@ -177,7 +177,7 @@ def rotate_joints(
         up = axis_vector(target.up)
         to_target = _arc(to_target @ source.left, left_of(target), up) @ to_target
     deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
-    rest = world_rotations(other.parents, joint_rotations(other, zero_pose(other)))
+    rest = rest_world_rotations(other)
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
     moved, missed = start.copy(), []
     world = np.empty((other.n_joints, 3, 3))

@@ -66,7 +66,7 @@ class RestPose:
 
 
 def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
-    """Return a skeleton's rest pose, DOFs at 0, rotated ``to_common`` (3, 3) axes."""
+    """Return the rest pose with DOFs at 0; ``to_common`` (3, 3) rotates points to common axes."""
     points = world_matrices(skeleton, zero_pose(skeleton))[:, :3, 3]
     local = quaternion_to_matrix(skeleton.rest_rotations)
     axis = axis_vector(up)
