@@ -159,7 +159,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
 
 
 def _leaps(speeds: Floats, is_root: Bools) -> Floats:
-    """Return (F, J) speeds of roots that are much slower two steps before and after, or 0."""
+    """Return (F, J) speeds of roots much slower in the two steps before and after; else 0."""
     steps = speeds[1:]
     around = np.pad(steps, ((2, 2), (0, 0)))
     count = len(steps)

@@ -58,7 +58,7 @@ def body_drive(
     joint_map: JointMap | None = None,
     plants_feet: bool = True,
 ) -> Drive:
-    """Return a body's motion as one that drives figures; ``up`` is the axis of its world."""
+    """Return a body's motion as one that drives figures; ``up``: its world's axis, y, z, -y, -z."""
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(
         SkeletonMotion(moving, clip),

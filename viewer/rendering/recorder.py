@@ -120,7 +120,10 @@ class Sink(Protocol):
         """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Write a frame, counted from 0, in a worker thread: (H, W, 4) uint8, read-only."""
+        """Write a frame, counted from 0, in a worker thread.
+
+        ``pixels``: (H, W, 4) uint8, sRGB with straight alpha, first row at the top; read-only.
+        """
 
     def close(self) -> None:
         """Finish the output and move it to its final name; called once, after the last frame."""

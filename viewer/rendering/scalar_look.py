@@ -79,7 +79,7 @@ def shown_ends(
     ranges: Sequence[tuple[float, float]],
     options: DisplayOptions,
 ) -> tuple[float, float]:
-    """Return the colour map's common range for all figures; the first one defines the unit."""
+    """Return the range of the colours, in the values' unit; a request is in that of ``figure``."""
     requested = options.scalar_range
     if requested is not None and not is_whole(name):
         factor, _ = shown_unit(name, figure)

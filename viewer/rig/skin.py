@@ -112,7 +112,7 @@ def has_influence(skin: Skin) -> Bools:
 
 
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
-    """Return joints (N,) without influence; those of auxiliary joints count for shown ones."""
+    """Return joints (N,) without influence; influences of auxiliary ones count for those shown."""
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
     if skeleton is not None and skeleton.n_joints == skin.n_joints:
         used, shown = shown_joint_of(skeleton)[used], shown_joints(skeleton)

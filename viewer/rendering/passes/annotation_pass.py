@@ -40,7 +40,7 @@ class AnnotationPass:
     def write(
         self, annotations: Sequence[Annotation], view: View, size: tuple[int, int]
     ) -> list[tuple[int, int]]:
-        """Draw labels without overlap; return how many of how many lack room, by annotation."""
+        """Draw labels without overlap; return numbers of omitted and seen labels, by annotation."""
         having = [row for row, one in enumerate(annotations) if one.labels is not None]
         labels = [one.labels for one in annotations if one.labels is not None]
         counts = [(0, 0)] * len(annotations)

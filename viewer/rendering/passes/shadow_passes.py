@@ -64,7 +64,10 @@ class ShadowPass:
         direction: Floats,
         strength: float,
     ) -> Shadow:
-        """Draw a shadow map of casters, (N, 4), which removes a fraction of the light."""
+        """Draw the shadow map of spheres (N, 4), centre and radius, around the casters.
+
+        ``direction``: unit, towards the light. ``strength``: fraction of the light that is removed.
+        """
         view, extent = light_view(spheres, direction, self.side)
         _draw_depths(self._framebuffer, draw, view)
         matrix = _TO_TEXTURE @ view.projection @ view.matrix
@@ -252,7 +255,8 @@ def map_side(size: tuple[int, int]) -> int:
 
 
 def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
-    """Return a directional light's view that contains spheres, (N, 4), and its half extent."""
+    """Return a directional light's view that contains spheres (N, 4), and its half extent."""
+    # ``direction`` is a unit vector towards the light.
     # Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
     # not crawl while figures move.
     axes = np.stack([*light_axes(direction), direction])

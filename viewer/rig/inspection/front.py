@@ -59,7 +59,7 @@ def usual_front(up: Up) -> Front:
 
 
 def front_axes(up: Up) -> tuple[Front, ...]:
-    """Return the four horizontal fronts for an up axis, as '+x' for "y"."""
+    """Return the four horizontal fronts: +x, -x, +z and -z if y is up."""
     return tuple(front for front in FRONTS if front[1] != up)
 
 

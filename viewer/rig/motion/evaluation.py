@@ -223,8 +223,8 @@ def frames_of(
 ) -> Frames:
     """Return a figure's poses at times (F,) of the motion's own clock.
 
-    ``base`` provides what the motion does not set; the pose of the file if omitted. RigError
-    without a skeleton, or if joint counts differ.
+    ``base`` provides what the motion does not set; the pose of the file if omitted.
+    ``interpolate``: also across gaps. RigError without a skeleton, or if joint counts differ.
     """
     if figure.skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to animate")

@@ -100,7 +100,7 @@ class SampledClip:
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
     ) -> Samples:
-        """Return all joints at times (T,); exactly at a frame, stored values are unchanged."""
+        """Return all joints at times (T,), across gaps if asked; frames are as stored."""
         before, after, fraction = self.timing.locate(times, interpolate)
         present = before >= 0
         before, after = np.maximum(before, 0), np.maximum(after, 0)
@@ -178,7 +178,7 @@ def is_shared(clip: SampledClip | PointClip, name: str) -> bool:
 def with_rows(
     clip: _Captured, timing: Timing, change: Callable[[str, Floats], Floats]
 ) -> _Captured:
-    """Return a clip whose arrays have other rows, by name and rows; a shared row stays."""
+    """Return a clip with ``change(name, rows)`` of each array's rows; a shared row stays."""
     arrays: dict[str, Any] = {}
     for name in (each.name for each in fields(clip)):
         rows = getattr(clip, name)

@@ -66,7 +66,7 @@ def upright_placement(scene: Scene, actor: Actor) -> Floats:
 
 
 def guess_up(actors: Iterable[Actor]) -> str:
-    """Return the axis, such as "-y", along which heads are above pelvises on average so far."""
+    """Return the axis, such as "-y", from pelvises to heads on average; "z" without evidence."""
     directions = [np.zeros((0, 3))]
     for actor in actors:
         clip = actor.captured
