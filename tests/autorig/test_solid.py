@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+from autorig.rigged_shapes import tube
+
+from viewer.autorig.solid import solid_of
+from viewer.autorig.transfer.joint_transfer import winding_numbers
+from viewer.errors import RigError
+
+# Sides of a box: two triangles each, counter-clockwise from outside; -x, +x, -y, +y, -z, +z.
+SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
+                  [1, 5, 7, 3]])  # fmt: skip
+
+
+def box(low, high, sides=range(6)):
+    corners = np.array(list(np.ndindex(2, 2, 2))) * (np.array(high) - low) + low
+    quads = SIDES[list(sides)]
+    return corners, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+def joined(*parts):
+    starts = np.cumsum([0] + [len(positions) for positions, _ in parts])
+    return (
+        np.concatenate([positions for positions, _ in parts]),
+        np.concatenate([start + part[1] for start, part in zip(starts, parts, strict=False)]),
+    )
+
+
+def volume(solid):
+    return len(solid.voxels) * solid.spacing**3
+
+
+@pytest.mark.parametrize("triangles", [1, -1])
+def test_box_has_its_volume_and_distances_also_inside_out(triangles):
+    positions, corners = box([1.0, 2, 3], [3, 3, 4])
+    solid = solid_of(positions, corners[:, ::triangles], resolution=40)
+    assert volume(solid) == pytest.approx(2.0, rel=1e-6)  # 40 x 20 x 20 voxels of 0.05
+    middle = solid.voxel_of(np.array([2.0, 2.5, 3.5]))
+    assert solid.inside[tuple(middle)]
+    assert solid.distance[tuple(middle)] == pytest.approx(0.5, abs=0.026)  # half a voxel
+    np.testing.assert_allclose(solid.centers(middle), [2.0, 2.5, 3.5], atol=0.026)
+
+
+def test_open_side_of_a_box_is_closed():
+    solid = solid_of(*box([0.0, 0, 0], [1, 1, 1], sides=range(5)), resolution=20)
+    assert volume(solid) == pytest.approx(1.0, rel=1e-6)
+
+
+def test_solid_agrees_with_winding_numbers():
+    positions, triangles = tube()
+    solid = solid_of(positions, triangles, resolution=24)
+    everywhere = np.array(list(np.ndindex(solid.inside.shape)), dtype=np.int32)
+    numbers = winding_numbers(positions, triangles, solid.centers(everywhere))
+    np.testing.assert_array_equal(numbers.reshape(solid.inside.shape) > 0.5, solid.inside)
+
+
+def test_overlapping_and_near_parts_are_one_component():
+    parts = joined(
+        box([0.0, 0, 0], [1, 1, 1]), box([0.5, 0, 0], [2, 1, 1]), box([2.1, 0.0, 0], [3, 1, 1])
+    )
+    solid = solid_of(*parts, resolution=30)
+    # Volumes 2 and 0.9, and a bridge of at most three voxels of 0.1.
+    assert 2.9 <= volume(solid) + 1e-9 <= 2.904
+    steps = solid.graph()
+    from scipy.sparse import csgraph
+
+    ends = solid.nearest(np.array([[0.05, 0.5, 0.5], [2.95, 0.5, 0.5]]))
+    length = csgraph.dijkstra(steps, indices=[ends[0]])[0, ends[1]]
+    assert 2.9 - 0.1 <= length < 4.0  # voxels are 0.1 wide; the bridge may be at a corner
+
+
+def test_distant_parts_are_left_out():
+    solid = solid_of(*joined(box([0.0, 0, 0], [1, 1, 1]), box([4.0, 0, 0], [4.5, 1, 1])), 45)
+    assert volume(solid) == pytest.approx(1.0, rel=1e-6)
+
+
+def test_sheet_thinner_than_a_voxel_is_kept():
+    parts = joined(box([0.0, 0, 0], [1, 1, 1]), box([1.0, 0, 0.52], [3, 1, 0.521]))
+    solid = solid_of(*parts, resolution=30)
+    assert solid.inside[tuple(solid.voxel_of(np.array([2.9, 0.5, 0.52])))]
+
+
+def test_flat_mesh_is_refused_where_nothing_is_enclosed():
+    with pytest.raises(RigError, match="expected a mesh with an extent, found a point"):
+        solid_of(np.zeros((3, 3)), np.array([[0, 1, 2]]))
