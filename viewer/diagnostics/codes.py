@@ -198,6 +198,9 @@ CODES: dict[str, Code] = {
     "G006": Code("warning", "invalid VRM data", "export the character again"),
     "G007": Code("note", "transform without effect", "none if intentional"),
     "G008": Code("error", "invalid VRM character", "export the character again"),
+    "G009": Code(
+        "note", "glTF data that validators reject", "none if other programs open the file"
+    ),
     "R001": Code(
         "note", "alignment of the template", "none if the template coincides with the target"
     ),

@@ -97,7 +97,7 @@ def open_files(
         opened.findings += late
         if path in refusals:
             opened.findings.append(_of_refusal(refusals[path], path))
-        opened.findings += map(of_diagnostic, source.diagnostics.warnings)
+        opened.findings += map(of_diagnostic, merged(source.diagnostics.warnings))
     _assemble(opened, settings)
     return opened
 

@@ -12,11 +12,14 @@ from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._subject import Subject, counting_of
+from viewer.phrases import listed
 from viewer.progress import report
 from viewer.rig.arrays import Ints
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.scene import Actor, Scene
+
+_NAMED = 3  # maximum number of animations that a note names
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,25 @@ def lint_scene(
             findings += import_module(f"viewer.lint.{name}").check(subject)
         if number + 1 == len(steps) or steps[number + 1][0] is not subject:
             subject.tracks.clear()  # a long track uses much memory, and is not needed again
-    return findings
+    return _together(findings)
+
+
+def _together(findings: Sequence[Finding]) -> list[Finding]:
+    """Return findings in order; equal notes about several animations are one, with their names."""
+    alike: dict[object, list[Finding]] = {}
+    for place, found in enumerate(findings):
+        is_common = found.severity == "note" and found.motion
+        key = (found.actor, found.diagnostic.key) if is_common else place
+        alike.setdefault(key, []).append(found)
+    return [_joined(group) for group in alike.values()]
+
+
+def _joined(group: Sequence[Finding]) -> Finding:
+    first = group[0]
+    if len(group) == 1:
+        return first
+    motion = str(listed([found.motion for found in group], _NAMED))
+    return replace(first, motion=motion, diagnostic=replace(first.diagnostic, count=len(group)))
 
 
 def _checked(

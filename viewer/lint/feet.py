@@ -26,6 +26,15 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.skeleton import joint_labels
 
+# Keyframes are drawn by hand: feet that are shifted or roll below the ground are a matter of style.
+# What is reported as a warning there cannot be one: a body that skates, or stands in the ground.
+_ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
+_DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
+# Floors of whole motions, as fractions of the figure's height
+_BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
+_LOW_FLOOR, _OTHER_FLOOR = 0.06, 0.25  # depths between which the floor of a capture is too low
+_CARRIED = 0.2  # minimum length of this path, as a fraction of the figure's height
+
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
@@ -48,10 +57,11 @@ def check(subject: Subject) -> Iterator[Finding]:
             yield _unsure(subject, found, step)
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
+        yield from _sunk_throughout(subject, track, feet, ground, height)
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
-    yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height)
+    yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height, height)
     yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
-    yield from _slipped(subject, track, feet, labels, heights - ground)
+    yield from _slipped(subject, track, feet, labels, heights - ground, height)
 
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
@@ -89,6 +99,7 @@ def _sunk(
     labels: list[str],
     heights: Floats,
     limit: float,
+    height: float,
 ) -> Iterator[Finding]:
     """Report feet that sink deeper than a limit in figure units."""
     depths = np.where(track.present[:, None], -heights, 0.0)
@@ -101,6 +112,11 @@ def _sunk(
         return
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
     worst = int(depths[frames[0]].argmax())
+    is_serious = (
+        subject.actor.captured is not None
+        or bool(deepest[frames[0]] > _DEEP * height * track.scale)
+        or _stands_sunk(track, depths, limit, height)
+    )
     each = track.of_each(frames)
     yield subject.found(
         "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
@@ -109,11 +125,49 @@ def _sunk(
         joint=labels[worst],
         depth=subject.length(float(deepest[frames[0]] / track.scale)),
         frame=int(track.numbers[frames[0]]),
+        severity="warning" if is_serious else "note",
         part="clip",
         joints=[feet[worst]],
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", int(frames[0])),
+    )
+
+
+def _stands_sunk(track: Track, depths: Floats, limit: float, height: float) -> bool:
+    """Return whether a foot rests below a limit for as long as feet stand."""
+    step, size = float(track.times[1] - track.times[0]), track.scale * height
+    for foot in depths.T:
+        rests = resting_frames(-foot, track.present, step, size, limits.RESTS_FOR)
+        if (rests & (foot > limit * track.scale)).sum() * step >= limits.RESTS_FOR:
+            return True
+    return False
+
+
+def _sunk_throughout(
+    subject: Subject, track: Track, feet: list[int], ground: float, height: float
+) -> Iterator[Finding]:
+    """Report feet that stand below the ground in a whole motion, where the ground is known."""
+    # A modelled character stands at rest on the floor of its animations, or they have it at 0. A
+    # capture may have any floor, and stand well below 0 if its root counts from the hip; a floor
+    # a little below is a fault of its height.
+    figure = subject.actor.figure
+    row = subject.actor.placement["xyz".index(subject.up)]
+    sole = float(row["xyz".index(figure.up)] * extent(figure)[0] + row[3])
+    size = track.scale * height
+    is_modelled = subject.actor.captured is None and figure.is_attached
+    floor, least, most = (sole, _BELOW, np.inf) if is_modelled else (0.0, _LOW_FLOOR, _OTHER_FLOOR)
+    depth = min(floor, 0.0) - ground
+    if not least * size < depth < most * size:
+        return
+    yield subject.found(
+        "C008.throughout: feet rest {depth} below the ground in the whole motion",
+        depth=subject.length(depth / track.scale),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[:1],
+        times=track.times[:1],
+        at=("frames", 0),
     )
 
 
@@ -155,6 +209,7 @@ def _slipped(
     feet: list[int],
     labels: list[str],
     heights: Floats,
+    height: float,
 ) -> Iterator[Finding]:
     """Report a foot that slides along the ground, where feet do not stand."""
     if track.body <= 0.0:  # legs without a length
@@ -184,6 +239,9 @@ def _slipped(
     if not (distances > limits.FAR * track.body).any():
         return
     worst = int(distances.argmax())
+    is_carried = subject.actor.captured is not None or _is_carried(
+        track, worst, slides[:, worst], height
+    )
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
     each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
     yield subject.found(
@@ -194,12 +252,24 @@ def _slipped(
         distance=subject.length(float(distances[worst] / track.scale)),
         speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
         frame=int(track.numbers[fastest]),
+        severity="warning" if is_carried else "note",
         part="clip",
         joints=[feet[worst]],
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", fastest),
     )
+
+
+def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
+    """Return whether the hip moves along with a foot while it slides: the body skates."""
+    # Animators also shift a foot under a body that stays, and let feet of walks in place glide at
+    # speeds that vary. Of the foot's path, only what the hip does in the same steps counts.
+    both, path = slides[1:] & slides[:-1], track.paths[foot]
+    steps, hips = np.diff(path.heel, axis=0)[both], np.diff(path.hip, axis=0)[both]
+    lengths = np.linalg.norm(steps, axis=1)
+    carried = float((np.einsum("na,na->n", hips, steps) / np.maximum(lengths, 1e-30)).sum())
+    return carried > _ALONG * lengths.sum() and carried > _CARRIED * height * track.scale
 
 
 def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:

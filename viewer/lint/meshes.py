@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewer.diagnostics.codes import Severity
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
 from viewer.phrases import agree, counted, rounded
@@ -26,6 +27,7 @@ from viewer.rig.mesh import Mesh, area_vectors, flat_triangles
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # maximum length of a zero normal
 _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are smoothed over an edge
+_FEW = 0.01  # fraction of triangles or normals up to which faults are too few to be seen
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -42,8 +44,9 @@ def check(subject: Subject) -> Iterator[Finding]:
     flat = flat_triangles(mesh) & known
     valid = np.flatnonzero(~flat & whole)
     # Degenerate triangles have neither neighbours nor an orientation.
-    corners = welded(mesh.positions, mesh.triangles)[valid]
-    yield from _against(subject, mesh, np.flatnonzero(~flat & known))
+    place = welded(mesh.positions, np.arange(mesh.n_vertices, dtype=np.int32))
+    corners = place[mesh.triangles[valid]]
+    yield from _against(subject, mesh, np.flatnonzero(~flat & known), place)
     yield from _flat(subject, flat)
     yield from _duplicate_triangles(subject, mesh, np.flatnonzero(whole))
     yield from _crowded_edges(subject, mesh, np.flatnonzero(whole))
@@ -59,9 +62,15 @@ def _flat(subject: Subject, flat: Bools) -> Iterator[Finding]:
         n=counted(len(triangles), "triangle", "has", "have", of=len(flat)),
         all=len(flat),
         triangle=int(triangles[0]),
+        severity=_severity(len(triangles), len(flat)),
         triangles=triangles,
         at=("triangles", int(triangles[0])),
     )
+
+
+def _severity(count: int, total: int) -> Severity:
+    """Return the severity of small faults: a warning if they are more than very few."""
+    return "warning" if count > _FEW * total else "note"
 
 
 def _duplicate_triangles(subject: Subject, mesh: Mesh, whole: Indices) -> Iterator[Finding]:
@@ -230,7 +239,7 @@ def _normals(subject: Subject, mesh: Mesh) -> Iterator[Finding]:
         )
 
 
-def _against(subject: Subject, mesh: Mesh, valid: Indices) -> Iterator[Finding]:
+def _against(subject: Subject, mesh: Mesh, valid: Indices, place: Indices) -> Iterator[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex."""
     corners = mesh.triangles[valid]
     facing = unit(area_vectors(mesh.positions, corners))
@@ -240,6 +249,12 @@ def _against(subject: Subject, mesh: Mesh, valid: Indices) -> Iterator[Finding]:
     opposed = np.bincount(places, cosines.ravel() < _AGAINST, minlength=count)
     # If triangles are missing, one of them may have agreed.
     against = np.flatnonzero((numbers > 0) & (opposed == numbers) & ~_beside_lost(subject, mesh))
+    if len(against):
+        # Along a hard edge or a seam, vertices at one place have separate normals, and artists give
+        # one side the mean of all: such a normal agrees with the surface as a whole.
+        around = _mean_normals(mesh, valid, place)
+        agrees = np.einsum("va,va->v", mesh.normals[against], around[against]) > -_AGAINST
+        against = against[~agrees]
     if len(against) == 0:
         return
     yield subject.found(
@@ -247,9 +262,18 @@ def _against(subject: Subject, mesh: Mesh, valid: Indices) -> Iterator[Finding]:
         n=counted(len(against), "normal", "opposes", "oppose", of=int((numbers > 0).sum())),
         all=int((numbers > 0).sum()),
         vertex=int(against[0]),
+        severity=_severity(len(against), int((numbers > 0).sum())),
         vertices=against,
         at=("normals", int(against[0])),
     )
+
+
+def _mean_normals(mesh: Mesh, valid: Indices, place: Indices) -> Floats:
+    """Return the area-weighted normal of all triangles at each vertex's position: (V, 3)."""
+    corners = mesh.triangles[valid]
+    areas, where = area_vectors(mesh.positions, corners), place[corners].ravel()
+    sums = [np.bincount(where, np.repeat(areas[:, axis], 3), mesh.n_vertices) for axis in range(3)]
+    return unit(np.stack(sums, axis=1))[place]
 
 
 def _vertices(subject: Subject, mesh: Mesh) -> Iterator[Finding]:

@@ -51,6 +51,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
             "S007.joints: {n} no name (first: joint {joint})",
             n=counted(len(nameless), "joint", "has", "have"),
             joint=nameless[0],
+            # A format that needs no names leaves all of them out; single ones were forgotten.
+            severity="note" if len(nameless) == skeleton.n_joints else "warning",
             part="skeleton",
             joints=nameless,
             at=("joints", nameless[0]),

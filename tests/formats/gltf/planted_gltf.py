@@ -62,6 +62,12 @@ def skinned_child() -> File:
     return file
 
 
+def apart() -> File:
+    file = skinned()
+    file.root["skins"][0]["skeleton"] = 2
+    return file
+
+
 def only_lines() -> File:
     file = File(nodes=[{"mesh": 0}])
     file.mesh()
@@ -79,5 +85,6 @@ PLANTED = {
     "G008": (no_hips, "/extensions/VRMC_vrm/humanoid/humanBones"),
     "F008": (only_lines, ""),
     "G007": (skinned_child, "/nodes/0"),
+    "G009": (apart, "/skins/0/skeleton"),
 }
 """A function that creates the document, and the JSON pointer to its error."""

@@ -140,10 +140,10 @@ FAULTS: dict[str, tuple[Callable[[], File], str, str]] = {
     "ACCESSOR_JOINTS_INDEX_DUPLICATE": (
         lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[1, 1, 0, 0]] * 3)), "W009", _WEIGHTS),
     "ACCESSOR_JOINTS_USED_ZERO_WEIGHT": (
-        lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[0, 1, 1, 0]] * 3)), "G002", _JOINTS),
-    "SKIN_NO_COMMON_ROOT": (lambda: _skin(_apart), "G004", "/skins/0/joints"),
+        lambda: _skin(_weights([[0.25, 0.75, 0, 0]] * 3, [[0, 1, 1, 0]] * 3)), "G009", _JOINTS),
+    "SKIN_NO_COMMON_ROOT": (lambda: _skin(_apart), "G009", "/skins/0/joints"),
     "SKIN_SKELETON_INVALID": (
-        lambda: _skin(_in_skin(skeleton=2)), "G004", "/skins/0/skeleton"),
+        lambda: _skin(_in_skin(skeleton=2)), "G009", "/skins/0/skeleton"),
     "INVALID_IBM_ACCESSOR_COUNT": (
         lambda: _skin(_binds(1)), "F002", "/skins/0/inverseBindMatrices"),
     "ACCESSOR_INVALID_IBM": (
@@ -154,7 +154,7 @@ FAULTS: dict[str, tuple[Callable[[], File], str, str]] = {
     "NODE_SKINNED_MESH_WITHOUT_SKIN": (
         lambda: _skin(lambda file: file.root["nodes"][0].pop("skin")), "G003", "/nodes/0"),
     "NODE_SKINNED_MESH_LOCAL_TRANSFORMS": (
-        lambda: _skin(_node(0, translation=[1, 0, 0])), "G003", "/nodes/0"),
+        lambda: _skin(_node(0, translation=[1, 0, 0])), "G007", "/nodes/0"),
     "MESH_PRIMITIVE_JOINTS_WEIGHTS_MISMATCH": (
         lambda: _skin(_attribute("JOINTS_1", [[0, 0, 0, 0]] * 3, "B")),
         "G004", f"{_PRIMITIVE}/attributes"),
@@ -275,7 +275,9 @@ def test_planted_error_is_found(tmp_path, code):
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
     found = [finding for finding in lint_files([path])[1] if finding.code == code]
-    severity = {"G007": "note", "F008": "error", "G008": "error"}.get(code, "warning")
+    severity = {"G007": "note", "G009": "note", "F008": "error", "G008": "error"}.get(
+        code, "warning"
+    )
     assert (severity, path, pointer) in {(one.severity, one.file, one.pointer) for one in found}
 
 
@@ -290,7 +292,7 @@ def test_valid_file_has_none_of_these_codes(tmp_path):
     [
         (0, ["skin of a mesh without joints and weights: not used"]),
         (1, ["used only by its 1 primitive without joints and weights"]),
-        (2, ["transform of a node with a skinned mesh: not used"]),
+        (2, ["1 node with a skinned mesh has a transform, which is not used: node 0"]),
     ],
 )
 def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(tmp_path, n_bound, messages):
@@ -301,9 +303,24 @@ def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(tmp_path, n_bou
     file.root["nodes"][0]["translation"] = [1, 0, 0]
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
-    found = [one.message for one in lint_files([path])[1] if one.code == "G003"]
+    found = [one.message for one in lint_files([path])[1] if one.code in ("G003", "G007")]
     assert len(found) == len(messages)
     assert all(text in one for one, text in zip(found, messages, strict=True))
+
+
+def test_skinned_nodes_with_parents_are_one_line(tmp_path):
+    file = skinned()
+    for name in ("body", "hair"):
+        file.root["nodes"] += [{"mesh": 0, "skin": 0, "name": name}]
+    count = len(file.root["nodes"])
+    file.add("nodes", {"children": [count - 2, count - 1]})
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    (found,) = [one.message for one in lint_files([path])[1] if one.code == "G007"]
+    assert found == (
+        "2 nodes with a skinned mesh are below other nodes, whose transforms have no effect on "
+        "them: body, hair"
+    )
 
 
 def test_contents_without_a_figure_are_named(tmp_path):

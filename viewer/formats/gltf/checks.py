@@ -18,7 +18,7 @@ from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree
 from viewer.formats._vrm.parts import list_in, objects_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
-from viewer.phrases import agree, counted, listed, rounded
+from viewer.phrases import agree, counted, listed, printable, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.file_record import Json
 from viewer.rig.hierarchy import descendants, roots_of
@@ -167,7 +167,7 @@ def _check_attributes(document: Document, attributes: Element) -> None:
         if unused.any():
             vertex = int(unused.any(axis=1).argmax())
             attributes.warn(
-                "G002.unused-joints: {n} of weight 0 {refer} to a joint other than 0 (first: "
+                "G009.unused-joints: {n} of weight 0 {refer} to a joint other than 0 (first: "
                 "vertex {vertex})",
                 name,
                 n=counted(int(unused.sum()), "influence"),
@@ -185,7 +185,7 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: Ints, roots: Ints) 
     found = np.unique(roots[read.joints]).tolist()
     if len(found) > 1:
         skin.warn(
-            "G004.no-common-root: expected joints with a common root, found joints below nodes "
+            "G009.no-common-root: expected joints with a common root, found joints below nodes "
             "{nodes}",
             "joints",
             nodes=listed(found, 12),
@@ -195,7 +195,7 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: Ints, roots: Ints) 
         outside = int((~descendants(parents, declared)[read.joints]).sum())
         if outside:
             skin.warn(
-                "G004.not-a-root: expected a common ancestor of all joints, found node {node}, "
+                "G009.not-a-root: expected a common ancestor of all joints, found node {node}, "
                 "with {n} outside its subtree",
                 "skeleton",
                 node=declared,
@@ -207,7 +207,7 @@ def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...
     """Check nodes with a mesh: skins without influences, influences without a skin."""
     n_bound = [sum(part.joints is not None for part in mesh.primitives) for mesh in meshes]
     is_drawn = [bool(mesh.primitives) for mesh in meshes]
-    identity = (0.0,) * 6 + (1.0,) * 4
+    identity, unused = (0.0,) * 6 + (1.0,) * 4, []
     for node in np.flatnonzero(tree.meshes >= 0).tolist():
         mesh, element = int(tree.meshes[node]), document.table("nodes")[node]
         if tree.skins[node] < 0:
@@ -232,9 +232,36 @@ def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...
                     n=counted(n_rigid, "primitive"),
                 )
             else:
-                element.warn(
-                    "G003.unused-transform: transform of a node with a skinned mesh: not used"
-                )
+                unused.append(node)
+    moved = np.flatnonzero((tree.skins >= 0) & (tree.parents >= 0)).tolist()
+    for message, found in (
+        (
+            "G007.unused-transform: {n} with a skinned mesh {have} a transform, which is not used: "
+            "{nodes}",
+            unused,
+        ),
+        (
+            "G007.skinned-child: {n} with a skinned mesh {are} below other nodes, whose transforms "
+            "have no effect on {it}: {nodes}",
+            moved,
+        ),
+    ):
+        if found:
+            table = document.table("nodes")
+            table[found[0]].warn(
+                message,
+                n=counted(len(found), "node"),
+                nodes=listed([_name(table[node].values, node) for node in found]),
+                have=agree(len(found), "has", "have"),
+                are=agree(len(found), "is", "are"),
+                it=agree(len(found), "it", "them"),
+            )
+
+
+def _name(node: Json, index: int) -> str:
+    """Return a node's name, or its number if it has none."""
+    name = node.get("name")
+    return printable(name, 60) if isinstance(name, str) and name else f"node {index}"
 
 
 def _check_animation(document: Document, animation: Element) -> None:
@@ -591,21 +618,13 @@ def _is_sheared(matrix: list[Any]) -> bool:
 def _check_skinned(
     root: Json, tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
 ) -> None:
-    """Check that skinned meshes are roots, in a scene with their joints."""
-    parents, tops = tree.parents.tolist(), roots_of(tree.parents)
+    """Check that skinned meshes are in a scene with their joints."""
+    tops = roots_of(tree.parents)
     scenes = [
         {node for node in list_in(scene, "nodes") if isinstance(node, int)}
         for _, scene in objects_in(root, "scenes")
     ]
     for node in np.flatnonzero(tree.skins >= 0).tolist():
-        if parents[node] >= 0:
-            found = f"a child of node {parents[node]}, whose transform has no effect"
-            report(
-                "G007.skinned-child: node with a skinned mesh: expected {wanted}, found {found}",
-                "a root",
-                found,
-                ("nodes", node),
-            )
         joints = skins[int(tree.skins[node])].joints.tolist()
         top, roots = int(tops[node]), set(tops[joints].tolist())
         shown = [scene for scene in scenes if top in scene]

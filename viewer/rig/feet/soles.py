@@ -12,6 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.hierarchy import descendants
 from viewer.rig.kinematics import world_matrices
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import zero_pose
 from viewer.rig.retargeting.joint_names import joint_meanings
@@ -22,6 +23,8 @@ _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the 
 # Tilts of a foot, from walking to lying on its instep.
 _TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
 _N_SIDES = 8  # number of horizontal directions of tilts
+
+_soles: Memo[Figure, Soles | None] = Memo(kept=2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +81,10 @@ def _axis(figure: Figure) -> int:
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     """Return the soles if names identify two feet; of joints, not the mesh, unless ``is_bound``."""
+    return _soles.get(figure, is_bound, lambda: _named_soles(figure, is_bound))
+
+
+def _named_soles(figure: Figure, is_bound: bool) -> Soles | None:
     skeleton = figure.skeleton
     if skeleton is None:
         return None

@@ -18,6 +18,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
+import numpy as np
+
 from viewer.rig.arrays import Ints
 from viewer.rig.hierarchy import path_to_root
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
@@ -176,8 +178,15 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
     ('pelvis', 'left_hip', 'left_ankle')
     """
+    return _canonical_names(tuple(names), tuple(np.asarray(parents).tolist()))
+
+
+@lru_cache(16)
+def _canonical_names(names: tuple[str, ...], links: tuple[int, ...]) -> tuple[str, ...]:
+    # Cached, because every motion of a figure asks for them.
     if len(names) > _MOST:
         return ("",) * len(names)
+    parents = np.array(links, dtype=np.int32)
     roles = _roles(names)
     chains = {chain: [j for j, role in enumerate(roles) if role == chain] for chain in _CHAINS}
     result = ["" if role in _CHAINS else role for role in roles]
