@@ -234,12 +234,14 @@ def camera_notes(
 
 def follow_notes(view: ViewOptions, scene: Scene) -> list[str]:
     """Return a message if several joints or actors have the name that the camera aims at."""
-    from viewer.rendering.framing import follow_candidates
-
     option, name = "--follow", view.follow
     if name is None:
         option, name = "--look-at", view.look_at
-    actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
+    if name is None:
+        return []
+    from viewer.rendering.framing import follow_candidates
+
+    actors = [scene.actors[i] for i, _ in follow_candidates(scene, name)]
     # A person's body and keypoints count as one match.
     others = [
         actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
