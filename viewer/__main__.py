@@ -7,6 +7,9 @@ import sys
 # The threads of OpenBLAS busy-wait for 2**26 clock cycles before they sleep, even right after numpy
 # is imported: 20 to 40 ms of processor time for each. They wake up fast enough after 2**20 cycles.
 _SPIN = ("OPENBLAS_THREAD_TIMEOUT", "20")
+# NVIDIA's driver keeps compiled shaders for the next start, but for the root user, who runs most
+# containers, only if told to.
+_SHADERS = ("__GL_SHADER_DISK_CACHE", "1")
 
 
 def main() -> int:
@@ -44,9 +47,14 @@ def _run(received: list[int]) -> int:
     # Garbage collection during imports would find nothing; ``run`` resumes it.
     gc.disable()
     os.environ.setdefault(*_SPIN)
+    os.environ.setdefault(*_SHADERS)
     from viewer.interrupts import watch_program
 
     watch_program(received)
+    if sys.argv[1:2] == ["render"] and not any(one.startswith("--gpu") for one in sys.argv):
+        from viewer.rendering.gpu.egl_devices import load_driver
+
+        load_driver()
     from viewer.cli import run
 
     return run(sys.argv[1:])

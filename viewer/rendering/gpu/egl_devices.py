@@ -1,11 +1,12 @@
-"""EGL devices: detection of graphics cards, and assignment to worker processes."""
+"""EGL devices: detection of graphics cards, assignment to worker processes, loading of drivers."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from viewer.data_classes import dataclass
@@ -13,6 +14,7 @@ from viewer.data_classes import dataclass
 _MOST = 64  # maximum number of devices
 _EXTENSIONS = 0x3055
 _CUDA_DEVICE = 0x323A  # EGL_CUDA_DEVICE_NV of EGL_NV_device_cuda
+_PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT of EGL_EXT_platform_device
 _SOFTWARE = "EGL_MESA_device_software"
 
 
@@ -30,22 +32,15 @@ class EglDevice:
 
 def egl_devices() -> list[EglDevice]:
     """Return the devices that EGL lists; an empty list if EGL is missing or cannot list them."""
-    if not sys.platform.startswith("linux"):
+    egl = _library()
+    if egl is None:
         return []
-    try:
-        egl = ctypes.CDLL("libEGL.so.1")
-    except OSError:
-        return []
-    query = _function(egl, "eglQueryDevicesEXT", ctypes.c_uint)
     text_of = _function(egl, "eglQueryDeviceStringEXT", ctypes.c_char_p)
     number_of = _function(egl, "eglQueryDeviceAttribEXT", ctypes.c_uint)
-    if query is None or text_of is None:
-        return []
-    handles, count = (ctypes.c_void_p * _MOST)(), ctypes.c_int()
-    if not query(_MOST, handles, ctypes.byref(count)):
+    if text_of is None:
         return []
     found = []
-    for index, handle in enumerate(handles[: count.value]):
+    for index, handle in enumerate(_handles(egl)):
         device = ctypes.c_void_p(handle)
         extensions = (text_of(device, _EXTENSIONS) or b"").decode("ascii", "replace").split()
         value = ctypes.c_ssize_t()
@@ -57,12 +52,66 @@ def egl_devices() -> list[EglDevice]:
     return found
 
 
+def _library() -> ctypes.CDLL | None:
+    """Return EGL; None if it is missing."""
+    if not sys.platform.startswith("linux"):
+        return None
+    try:
+        return ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return None
+
+
+def _handles(egl: ctypes.CDLL) -> list[int | None]:
+    """Return EGL's handles of its devices; an empty list if it cannot list them."""
+    query = _function(egl, "eglQueryDevicesEXT", ctypes.c_uint)
+    handles, count = (ctypes.c_void_p * _MOST)(), ctypes.c_int()
+    if query is None or not query(_MOST, handles, ctypes.byref(count)):
+        return []
+    return handles[: count.value]
+
+
 def _function(egl: ctypes.CDLL, name: str, result: Any) -> Any:
     """Return an extension function, or None if there is none."""
     find = egl.eglGetProcAddress
     find.restype = ctypes.c_void_p
     address = find(name.encode())
     return ctypes.CFUNCTYPE(result)(address) if address else None
+
+
+def set_log_level() -> None:
+    """Keep Mesa from printing its own messages before ours, which are clearer."""
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
+
+
+def load_driver(environment: Mapping[str, str] = os.environ) -> threading.Thread | None:
+    """Start to load the driver of the first device in a thread, which is returned.
+
+    Drivers are large, and most of the time to create a context passes in ``eglInitialize``. It is
+    called once per device: the context that is created later finds the driver loaded, or waits for
+    it. Meanwhile the main thread imports modules and reads files. Failures are ignored here, since
+    the creation of the context reports them. Nothing happens if glcontext is told to use other
+    libraries or another device.
+    """
+    if any(name.startswith("GLCONTEXT_") for name in environment):
+        return None
+    # The environment must not change while the driver reads it in the other thread.
+    set_log_level()
+    thread = threading.Thread(target=_initialize, name="graphics driver")
+    thread.start()
+    return thread
+
+
+def _initialize() -> None:
+    egl = _library()
+    handles = [] if egl is None else _handles(egl)
+    if egl is None or not handles:
+        return
+    display_of = _function(egl, "eglGetPlatformDisplayEXT", ctypes.c_void_p)
+    if display_of is not None:
+        # The display that glcontext asks for: equal arguments give the same one.
+        display = display_of(_PLATFORM_DEVICE, ctypes.c_void_p(handles[0]), None)
+        egl.eglInitialize(ctypes.c_void_p(display), None, None)
 
 
 def device_of_worker(
