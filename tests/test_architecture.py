@@ -240,7 +240,8 @@ def test_every_public_module_documents_itself():
 def test_shaders_state_their_version_and_use_name_prefixes():
     for path in (ROOT / "shaders").glob("*.*"):
         text = path.read_text()
-        assert text.startswith("#version 330\n"), path
+        version = 430 if path.suffix == ".comp" else 330
+        assert text.startswith(f"#version {version}\n"), path
         assert not re.findall(r"^in \w+ (?!in_|v_)", text, re.MULTILINE), path
         assert not re.findall(r"^out \w+ (?!v_|f_)", text, re.MULTILINE), path
         assert not re.findall(r"^uniform \w+ (?!u_)", text, re.MULTILINE), path

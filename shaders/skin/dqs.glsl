@@ -4,7 +4,7 @@ uniform sampler2D u_rigid;      // five texels per joint: real part, dual part, 
 
 // One texel of a joint in u_rigid; the texture rows of upload.py hold 128 joints.
 vec4 rigid_texel(int joint, int texel) {
-    int index = gl_InstanceID * u_n_joints + joint;
+    int index = instance * u_n_joints + joint;
     return texelFetch(u_rigid, ivec2(5 * (index & 127) + texel, index >> 7), 0);
 }
 

@@ -8,6 +8,7 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
+from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
@@ -26,9 +27,9 @@ def main(rounds: int = 30) -> None:
     times = measure(figure, rounds)
     shown = f"{figure.name}: {figure.mesh.n_vertices} vertices, 1280 x 720"
     report(shown, times, ("correctives", "no correctives"))
-    for name in ("texture", "product"):
+    for name in WAYS:
         ratio = median_ratio(times, f"skinning alone, {name}", "skinning alone, none")
-        print(f"  correctives as {name} / none, skinning alone: {ratio:.2f}")
+        print(f"  correctives by the {name} / none, skinning alone: {ratio:.2f}")
     print(f"  DQS / LBS: {median_ratio(times, 'DQS', 'no correctives'):.2f}\n")
     if PIG.is_dir():
         pig = viewer.load(PIG).actors[0].figure
@@ -56,28 +57,25 @@ def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
 
         frame(Skinning())
         buffers = offscreen.renderer.buffers.posed_mesh(actor).mesh
-        meshes = {
-            way: PosedMesh(offscreen.context, offscreen.renderer.programs, buffers, way)
-            for way in ("texture", "product")
-        }
+        mesh = PosedMesh(offscreen.context, offscreen.renderer.programs, buffers)
 
-        def skin(way: str, correctives: bool) -> None:
+        def skin(way: Way, correctives: bool) -> None:
             target.framebuffer.use()
             dofs[:] = rng.normal(0.0, 0.2, len(dofs))
-            meshes[way].update(actor.pose, Skinning(correctives=correctives))
+            buffers.corrective_sums.way = way
+            mesh.update(actor.pose, Skinning(correctives=correctives))
             offscreen.context.finish()
 
         work = {
             "correctives": lambda: frame(Skinning()),
             "no correctives": lambda: frame(Skinning(correctives=False)),
             "DQS": lambda: frame(Skinning("dqs", correctives=False)),
-            "skinning alone, texture": lambda: skin("texture", True),
-            "skinning alone, product": lambda: skin("product", True),
-            "skinning alone, none": lambda: skin("product", False),
+            "skinning alone, card": lambda: skin("card", True),
+            "skinning alone, processor": lambda: skin("processor", True),
+            "skinning alone, none": lambda: skin("processor", False),
         }
         times = interleaved(work, rounds)
-        for mesh in meshes.values():
-            mesh.release()
+        mesh.release()
         return times
 
 

@@ -17,6 +17,7 @@ from measure import interleaved, median_ratio
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -80,8 +81,10 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
 
     def prepare() -> None:
         pose_actors([actor], clock.next())
-        assert actor.pose is not None
-        renderer.buffers.posed_mesh(actor).upload(actor.pose, options.skinning)
+        figure = actor.figure
+        posed_skeleton(figure.require_skeleton(), actor.require_pose()).palette(
+            figure.require_skin()
+        )
 
     return frame, prepare
 

@@ -93,16 +93,18 @@ def _onion(rounds: int) -> None:
     for number, (solid, ghost) in enumerate(zip(opaque.actors, ghosts.actors, strict=True)):
         solid.placement[0, 3] = ghost.placement[0, 3] = 0.4 * number
         ghost.opacity = (number + 1.0) / N_ONION
-    with Offscreen() as offscreen, offscreen.context:
+    # A renderer keeps the buffers of only one scene.
+    with Offscreen() as first, Offscreen() as second:
         camera, box = default_camera(opaque, SIZE), scene_box(opaque)
 
-        def draw(scene: Scene) -> None:
-            target = offscreen.target(SIZE, 4)
-            offscreen.renderer.draw(scene, camera, DisplayOptions(), target, box)
-            target.resolve()
-            offscreen.context.finish()
+        def draw(offscreen: Offscreen, scene: Scene) -> None:
+            with offscreen.context:
+                target = offscreen.target(SIZE, 4)
+                offscreen.renderer.draw(scene, camera, DisplayOptions(), target, box)
+                target.resolve()
+                offscreen.context.finish()
 
-        work = {"onion": partial(draw, ghosts), "opaque": partial(draw, opaque)}
+        work = {"onion": partial(draw, first, ghosts), "opaque": partial(draw, second, opaque)}
         title = f"{N_ONION} bodies, drafts, all but one translucent against opaque"
         report(title, interleaved(work, rounds), ("onion", "opaque"))
 

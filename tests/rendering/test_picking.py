@@ -113,7 +113,7 @@ def test_picking_does_not_skin_actors_again(offscreen, monkeypatch):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     offscreen.render(scene, (80, 80), parallel(), DisplayOptions(), scene_box(scene))
     before = offscreen.renderer.buffers.posed_mesh(scene.actors[0]).n_updates
-    monkeypatch.setattr(PosedMesh, "upload", None)
+    monkeypatch.setattr(PosedMesh, "_skin", None)
     assert click(offscreen, scene, 0.5, 0.0) is not None
     assert offscreen.renderer.buffers.posed_mesh(scene.actors[0]).n_updates == before
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import moderngl
 import numpy as np
@@ -59,9 +58,9 @@ class Casters:
                 continue
             placement = placement_of(actor, options)
             self.mesh_pass.draw_shape(mesh, placement, view, options, fragment, self._prepare)
-        for actors, instances in self.meshes.instanced:
+        for _, instances in self.meshes.instanced:
             how = view, options, fragment, self._prepare
-            draw_instance_shapes(self.programs, instances, actors, *how)
+            draw_instance_shapes(self.programs, instances, *how)
         for actor in self.actors:
             if options.opacity * actor.opacity <= self.threshold:
                 continue
@@ -81,25 +80,38 @@ class Casters:
 
     def largest_mesh(self) -> float:
         """Return the size of the largest mesh at rest, scene units; 0 without meshes."""
-        found = 0.0
-        for actor in self.actors:
-            figure = actor.figure
-            if actor.is_drawn and figure.mesh is not None:
-                size = _sizes.get(figure, None, partial(_mesh_size, figure))
-                scale = stretch_bounds(placement_of(actor, self.options)[None])[0]
-                found = max(found, float(scale) * size)
-        return found
+        sizes = [
+            mesh_size(instances.mesh.figure) * instances.largest_scale
+            for _, instances in self.meshes.instanced
+        ]
+        for actor in self._alone():
+            if actor.figure.mesh is not None:
+                scale = float(stretch_bounds(placement_of(actor, self.options)))
+                sizes.append(mesh_size(actor.figure) * scale)
+        return max(sizes, default=0.0)
 
     def spheres(self) -> list[Floats]:
-        """Return bounding spheres of each drawn actor: (N, 4) centres and radii, scene space."""
-        drawn = [actor for actor in self.actors if actor.is_drawn]
-        found = [spheres_of(actor, self.options) for actor in drawn]
-        return [spheres for spheres in found if len(spheres) and np.isfinite(spheres).all()]
+        """Return bounding spheres of drawn actors: (A, N, 4) centres and radii, scene space.
+
+        Each array is of one actor, or of several of one figure.
+        """
+        found = [instances.spheres() for _, instances in self.meshes.instanced]
+        found += [spheres_of(actor, self.options)[None] for actor in self._alone()]
+        for actors, _ in self.meshes.instanced:
+            if self.options.show == "both" or any(actor.points is not None for actor in actors):
+                found += [spheres_of(actor, self.options)[None] for actor in actors]
+        kept = (spheres[np.isfinite(spheres).all(axis=(1, 2))] for spheres in found)
+        return [spheres for spheres in kept if spheres.size]
+
+    def _alone(self) -> list[Actor]:
+        """Return the drawn actors whose meshes are not drawn as instances."""
+        together = {id(actor) for actors, _ in self.meshes.instanced for actor in actors}
+        return [actor for actor in self.actors if actor.is_drawn and id(actor) not in together]
 
 
-def _mesh_size(figure: Figure) -> float:
+def mesh_size(figure: Figure) -> float:
     """Return the size of a figure's mesh at rest, figure units."""
-    return box_size(bounding_box(figure.require_mesh().positions))
+    return _sizes.get(figure, None, lambda: box_size(bounding_box(figure.require_mesh().positions)))
 
 
 def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
@@ -124,7 +136,9 @@ def _mesh_spheres(actor: Actor, options: DisplayOptions) -> Floats:
     figure, pose = actor.figure, actor.pose
     if options.show == "binding" or pose is None or not figure.is_attached:
         return box_spheres(bounding_box(figure.require_mesh().positions))
-    return skin_spheres(shaped(figure, pose.shape_weights), pose)
+    figure = shaped(figure, pose.shape_weights)
+    palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
+    return skin_spheres(figure, palette)
 
 
 def _joint_spheres(actor: Actor) -> Floats:

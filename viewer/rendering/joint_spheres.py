@@ -6,27 +6,31 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.memo import Memo
-from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin, bind_positions, owners
 
 _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
 _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
 
 
-def skin_spheres(figure: Figure, pose: Pose) -> Floats:
-    """Return bounds of a figure's vertices from its joints: (N, 4) centre, radius; figure space."""
+def skin_spheres(figure: Figure, palette: Floats, sizes: Floats | None = None) -> Floats:
+    """Return bounds of a figure's vertices from its joints: (..., N, 4) centre, radius.
+
+    ``palette``: (..., J, 4, 4) skinning matrices to any space. ``sizes``: their ``rigid_sizes``, if
+    known.
+    """
     # A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
     # it lies in the convex hull of spheres around the joints that reach their farthest vertices.
     skin = figure.require_skin()
     centers, radii = _reaches.get(figure, (), lambda: _reaches_of(figure, skin))
-    palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
+    is_rigid = sizes is not None and bool((sizes > 0.0).all())
+    stretches = np.sqrt(sizes) if sizes is not None and is_rigid else stretch_bounds(palette)
     used = radii >= 0.0
     if not used.all():
-        palette, centers, radii = palette[used], centers[used], radii[used]
-    moved = (palette[:, :3, :3] @ centers[..., None])[..., 0] + palette[:, :3, 3]
-    return np.column_stack([moved, _MARGIN * radii * stretch_bounds(palette)])
+        palette, stretches = palette[..., used, :, :], stretches[..., used]
+        centers, radii = centers[used], radii[used]
+    moved = (palette[..., :3, :3] @ centers[..., None])[..., 0] + palette[..., :3, 3]
+    return np.concatenate([moved, (_MARGIN * radii * stretches)[..., None]], axis=-1)
 
 
 def stretch_bounds(matrices: Floats) -> Floats:

@@ -17,7 +17,6 @@ from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import Effects, Shadow, View, key_direction
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import bounding_box, box_size
 
 if TYPE_CHECKING:
     from viewer.rendering.casters import Casters
@@ -68,11 +67,13 @@ class Lighting:
         of_actors = casters.spheres()
         if not of_actors:
             return
-        self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
+        spans = (np.ptp(spheres[..., :3], axis=1) for spheres in of_actors)
+        self._size = max(float(np.linalg.norm(span, axis=1).max()) for span in spans)
         # All joints of a figure may coincide.
         self._size = self._size or casters.largest_mesh()
         if options.has_shadows and self._size > 0.0:
-            self._spheres, (axes, height) = np.concatenate(of_actors), _ground(up, box)
+            self._spheres = np.concatenate([spheres.reshape(-1, 4) for spheres in of_actors])
+            axes, height = _ground(up, box)
             self._contact = self._contact_pass.draw(
                 casters.draw, self._spheres, self._size, axes, height
             )

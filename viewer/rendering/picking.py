@@ -101,7 +101,7 @@ class PickPass:
             self._draw_mesh(numbers[id(actor)], mesh, placement_of(actor, options), near, options)
         for actors, instances in meshes.instanced:
             whose_numbers = [numbers[id(actor)] for actor in actors]
-            self._draw_instances(whose_numbers, actors, instances, near, options)
+            self._draw_instances(whose_numbers, instances, near, options)
         update_skeletons(self._buffers, scene.actors, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
@@ -151,7 +151,6 @@ class PickPass:
     def _draw_instances(
         self,
         numbers: list[int],
-        actors: list[Actor],
         instances: InstanceBuffers,
         view: View,
         options: DisplayOptions,
@@ -167,7 +166,7 @@ class PickPass:
             self._number(program, found)
 
         how = view, options, "pick", prepare
-        draw_instance_shapes(self._programs, instances, actors, *how)
+        draw_instance_shapes(self._programs, instances, *how)
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self._buffers.skeleton(actor)

@@ -318,9 +318,9 @@ class Renderer:
             if mesh.mesh.is_blended or not blended:
                 placement = placement_of(actor, options)
                 self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
-        for actors, instances in meshes.instanced:
+        for _, instances in meshes.instanced:
             if instances.mesh.is_blended or not blended:
-                draw_instances(self.programs, instances, actors, view, options, blended)
+                draw_instances(self.programs, instances, view, options, blended)
 
     def _set_state(self, target: Target) -> None:
         """Bind a target with the state that all passes expect."""

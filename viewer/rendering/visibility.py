@@ -12,7 +12,7 @@ from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.instance_pass import InstanceBuffers, instance_groups
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -49,13 +49,12 @@ def prepare_meshes(
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
     of_figure: dict[int, list[list[Actor]]] = {}
-    for group in instance_groups(actors, options):
+    for group in buffers.groups(actors, options):
         of_figure.setdefault(id(group[0].figure), []).append(group)
     for groups in of_figure.values():
         instanced = buffers.instanced(groups[0][0].figure, len(groups))
         for group, instances in zip(groups, instanced, strict=True):
-            poses = [actor.pose for actor in group if actor.pose is not None]
-            instances.update(poses, options.skinning)
+            instances.vertices.reserve(len(group))
             meshes.instanced.append((group, instances))
     together = {id(actor) for group, _ in meshes.instanced for actor in group}
     for actor in actors:
@@ -73,6 +72,8 @@ def update_meshes(
         pose = None if options.show == "binding" else actor.pose
         mesh.hidden_parts = actor.hidden_parts
         mesh.update(pose, options.skinning)
+    for group, instances in meshes.instanced:
+        instances.update(group, options.skinning)
     return meshes
 
 

@@ -114,13 +114,20 @@ def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
 
 def rigid_sizes(palette: Floats) -> Floats:
     """Return s^2 (..., J) of joints with A^T A = s^2 I and det A > 0, and 0 for all others."""
-    linear = palette[..., :3, :3]
-    gram = np.swapaxes(linear, -1, -2) @ linear
-    squares = gram[..., 0, 0]
-    errors = np.abs(gram - squares[..., None, None] * np.eye(3)).max(axis=(-2, -1))
-    # A reflection also has orthogonal columns, but a negative determinant.
-    # Its sign is found without the product, which may overflow.
-    is_uniform = (errors <= _RIGID * squares) & (np.linalg.slogdet(linear).sign > 0.0)
+    # Products of contiguous matrices take a fifth of the time of products of views.
+    linear = np.ascontiguousarray(palette[..., :3, :3])
+    gram = np.ascontiguousarray(np.swapaxes(linear, -1, -2)) @ linear
+    squares = gram[..., 0, 0].copy()
+    entries = gram.reshape(*squares.shape, 9)
+    entries[..., ::4] -= squares[..., None]
+    errors = np.abs(entries, out=entries).max(axis=-1)
+    is_uniform = (errors <= _RIGID * squares) & (squares > 0.0)
+    # A reflection also has orthogonal columns, but a negative determinant. Divided by s, so that
+    # the product does not overflow, the matrix has a determinant near 1 or -1.
+    linear /= np.sqrt(np.where(is_uniform, squares, 1.0))[..., None, None]
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(linear, (-2, -1), (0, 1))
+    with np.errstate(over="ignore", invalid="ignore"):  # of matrices that are not uniform
+        is_uniform &= a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
     return np.where(is_uniform, squares, 0.0)
 
 

@@ -9,7 +9,7 @@ import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS
-from viewer.rig.motion.instances import worlds
+from viewer.rig.motion.instances import pose_arrays, worlds
 from viewer.rig.posing.pose_vector import read_vector
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import shaped
@@ -45,7 +45,7 @@ def test_vertices_and_joints_match_the_published_equations(figure, seed):
     assert_allclose(joint_matrices(figure, pose)[:, :3, 3], joints, atol=ROUNDING)
     # Batched poses have the same joints.
     skeleton = shaped(figure, pose.shape_weights).skeleton
-    found = worlds(skeleton, [pose, pose])[1, :, :3, 3] + pose.figure_translation
+    found = worlds(skeleton, pose_arrays([pose, pose]))[1, :, :3, 3] + pose.figure_translation
     assert_allclose(found, joints, atol=ROUNDING)
 
 

@@ -21,7 +21,6 @@ from viewer.rendering.gpu.surfaces import PLAIN
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skinning import Skinning
 
 _KINDS = ("Buffer", "Texture", "VertexArray", "Framebuffer", "Renderbuffer", "Query")
 _PROGRAMS = ("Program", "Shader")
@@ -227,7 +226,7 @@ def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(offscreen, monk
         with offscreen.context:
             before = gl_objects()
             monkeypatch.setattr(upload, "check_errors", fail_once)
-            monkeypatch.setattr("viewer.rendering.gpu.posed_mesh.checked", upload.checked)
+            monkeypatch.setattr("viewer.rendering.gpu.posed_vertices.checked", upload.checked)
             try:
                 offscreen.renderer.prepare(scene(count))
                 is_done = True
@@ -248,7 +247,7 @@ def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch):
     draw(offscreen, opened)
     with offscreen.context:
         buffers = offscreen.renderer.buffers.mesh(figure)
-        rest = offscreen.renderer.buffers.posed_mesh(opened.actors[0])._rest
+        rest = offscreen.renderer.buffers.posed_mesh(opened.actors[0])._vertices._rest
         before, calls = gl_objects(), []
 
         def second_fails(context, doing) -> None:
@@ -258,11 +257,10 @@ def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch):
 
         monkeypatch.setattr(upload, "check_errors", second_fails)
         moved = replace(figure, mesh=replace(mesh, positions=mesh.positions + 0.1))
-        shape = replace(opened.actors[0].require_pose(), shape_weights=np.ones(1))
         with pytest.raises(RenderError, match=r"^a shaped mesh of 0\.\d MB: not enough"):
-            rest.update(moved, shape, Skinning())
+            rest.reshape(moved)
         assert gl_objects() == before
-        rest.update(moved, shape, Skinning())
+        rest.reshape(moved)
         found = np.frombuffer(rest.positions.read(), "f4").reshape(-1, 3)
         expected = (mesh.positions + 0.1 - buffers.center)[buffers.sources]
         np.testing.assert_allclose(found, expected, atol=1e-6)

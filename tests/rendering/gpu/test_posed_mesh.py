@@ -349,8 +349,8 @@ def test_changed_pose_uploads_one_palette_and_no_vertices(drawing, uploads):
     uploads.clear()
     drawing.scene.actors[0].pose.dofs[4] = 0.5
     drawing.draw()
-    # A palette of 3 joints is one row of 256 matrices of three texels with four floats.
-    assert uploads == [("texture", 256 * 3 * 4 * 4)]
+    # The matrices of 3 joints and the centres, each three texels with four floats.
+    assert uploads == [("texture", 3 * 3 * 4 * 4), ("texture", 3 * 4 * 4)]
 
 
 def test_moving_the_camera_uploads_no_data(drawing, uploads):

@@ -26,15 +26,13 @@ def build(ctx, name: str):
     """Compile every program that includes a file."""
     programs = Programs(ctx)
     try:
-        if name.startswith("instance"):
-            return programs.drawing("instance", "phong", "mesh", skin="mix")
         if name.startswith("point"):
             return programs.drawing("point", "phong", "mesh")
-        if name.startswith("pick"):
-            return programs.drawing("instance", fragment="pick", skin="dqs", materials=True)
+        if name.startswith(("pick", "mesh.vert")):
+            return programs.drawing("mesh", fragment="pick", materials=True, instanced=True)
         if name.startswith("motion_path"):
             return programs.drawing("motion_path")
-        if name.startswith(("skin", "include")):
+        if name.startswith(("skin", "include/normals")):
             return programs.feedback("skin", "lbs", VARYINGS)
         if name.startswith(("corners", "shade/scalar")):
             return programs.drawing("mesh", "scalar", geometry="corners")
@@ -69,8 +67,6 @@ def lines_to_break(text: str) -> list[int]:
         "overlay.frag",
         "skin.vert",
         "skin/lbs.glsl",
-        "include/skinning.glsl",
-        "instance.vert",
         "point.vert",
         "motion_path.vert",
         "motion_path.frag",
@@ -138,8 +134,15 @@ def test_every_shading_mode_compiles(ctx, shading):
 def test_every_skinning_method_compiles(ctx, method):
     programs = Programs(ctx)
     assert "u_pairs" in programs.feedback("skin", method, VARYINGS)
-    for shading in SHADING:
-        assert "u_pairs" in programs.drawing("instance", shading, "mesh", skin=method)
+    rows = programs.feedback("skin", method, VARYINGS, ("AFFINE_PALETTE", "REST_ROWS"))
+    assert "in_position" not in rows
+    programs.release()
+
+
+@pytest.mark.parametrize("shading", [shading for shading in SHADING if shading != "scalar"])
+def test_every_shading_mode_compiles_for_instances(ctx, shading):
+    programs = Programs(ctx)
+    assert "in_place_rest" in programs.drawing("mesh", shading, instanced=True)
     programs.release()
 
 

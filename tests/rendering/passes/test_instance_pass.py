@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 from rendering.drawn_figures import arm, bent, checker, random_figure, random_pose
@@ -10,9 +11,10 @@ import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu import posed_vertices
+from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.gpu.rest_buffers import WAYS
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
@@ -32,30 +34,31 @@ VARYINGS = "v_position", "v_normal"
 class Instances:
     """Instances with vertices that are read back instead of drawn."""
 
-    def __init__(self, ctx, figure: Figure, way: str = "") -> None:
+    def __init__(self, ctx, figure: Figure, way: Way = "processor") -> None:
         self.context, self.programs = ctx, Programs(ctx)
         self.mesh = MeshBuffers(ctx, figure, [])
-        self.instances = InstanceBuffers(ctx, self.mesh, way)
+        if figure.correctives is not None:
+            self.mesh.corrective_sums.way = way
+        self.instances = InstanceBuffers(ctx, self.programs, self.mesh)
 
     def vertices(self, actors, how: Skinning, eye=(0.0, 0.0, 0.0)):
         """Return the output of the drawing pass's vertex shader, relative to the eye."""
         matrix = np.eye(4)
         matrix[:3, 3] = -np.asarray(eye)
-        view = View(matrix, np.eye(4), Camera())
-        self.instances.update([actor.pose for actor in actors], how)
-        program = self.programs.feedback(
-            "instance", how.method, VARYINGS, summed=self.instances.has_sums
-        )
-        self.instances.place(actors, view)
-        self.instances.use(program, view)
+        self.instances.update(actors, how)
+        program = self.programs.feedback("mesh", "", VARYINGS, ("INSTANCED",))
+        self.instances.use(program, View(matrix, np.eye(4), Camera()))
         count = self.mesh.n_vertices
         out = self.context.buffer(reserve=24 * count * len(actors))
         array = self.instances.array(program)
-        array.transform(out, vertices=count, instances=len(actors))
+        array.transform(out, moderngl.POINTS, vertices=count, instances=len(actors))
         rows = np.frombuffer(out.read(), dtype="f4").reshape(len(actors), count, 6).astype(float)
         out.release()
         rows = rows[:, self.mesh.copies]
-        return rows[..., :3], rows[..., 3:]
+        normals = rows[..., 3:]
+        return rows[..., :3], normals / np.maximum(np.linalg.norm(normals, axis=-1), 1e-30)[
+            ..., None
+        ]
 
     def release(self) -> None:
         for item in (self.instances, self.mesh, self.programs):
@@ -265,21 +268,20 @@ def test_instances_of_a_removed_figure_are_freed(offscreen):
     offscreen.render(scene, (50, 50), camera, DisplayOptions(), box)
     instances = offscreen.renderer.buffers.instanced(scene.actors[0].figure, 1)[0]
     offscreen.render(rows_of_arms(2), (50, 50), camera, DisplayOptions(), box)
-    assert instances._palette is None
+    assert instances.vertices.posed is None
     assert len(offscreen.renderer.buffers._instanced) == 0
 
 
 def test_refused_upload_is_tried_again(ctx, monkeypatch):
     figure = random_figure(np.random.default_rng(7), 6)
     instances, actors = Instances(ctx, figure), cast(figure, 3)
-    poses = [actor.pose for actor in actors]
 
     def refuse(*_):
         raise RenderError("no room")
 
     with monkeypatch.context() as patch, pytest.raises(RenderError):
-        patch.setattr(instance_pass, "write_stacked", refuse)
-        instances.instances.update(poses, Skinning())
+        patch.setattr(posed_vertices, "write_stacked", refuse)
+        instances.instances.update(actors, Skinning())
     check(instances, actors, Skinning())
     instances.release()
 

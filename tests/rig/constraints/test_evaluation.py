@@ -11,7 +11,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.evaluation import frames_of, still_frames, world_frames
-from viewer.rig.motion.instances import worlds
+from viewer.rig.motion.instances import pose_arrays, worlds
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import rest_pose
@@ -90,7 +90,7 @@ def test_poses_frames_and_instances_agree_and_ignore_own_rotation_of_the_joint()
         pose.dofs[:] = rng.uniform(-1.5, 1.5, rig.n_dofs)
         pose.scales[:] = rng.uniform(0.8, 1.2, (1, 1))
     expected = np.stack([world_matrices(rig, pose) for pose in poses])
-    assert_allclose(worlds(rig, poses), expected, atol=1e-12)
+    assert_allclose(worlds(rig, pose_arrays(poses)), expected, atol=1e-12)
     assert_allclose(world_frames(figure, still_frames(figure, poses[1])), expected[1:2], atol=1e-12)
     free = replace(rig, constraints=())
     assert np.abs(world_matrices(free, poses[0]) - expected[0]).max() > 0.1

@@ -27,7 +27,7 @@ from viewer.rig.motion.evaluation import (
     still_pose,
     world_frames,
 )
-from viewer.rig.motion.instances import local_rotations, placements, worlds
+from viewer.rig.motion.instances import local_rotations, placements, pose_arrays, worlds
 from viewer.rig.motion.motion_paths import motion_path, path_times, segments
 from viewer.rig.motion.onion import FAINTEST, onion
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -365,8 +365,8 @@ def test_batched_matrices_match_each_pose():
     joints = moving_skeleton()
     poses = random_poses(joints, 7)
     rotations, found, places = (
-        local_rotations(joints, poses),
-        worlds(joints, poses),
+        local_rotations(joints, pose_arrays(poses)),
+        worlds(joints, pose_arrays(poses)),
         placements(poses),
     )
     assert found.shape == (7, 4, 4, 4)
@@ -374,7 +374,7 @@ def test_batched_matrices_match_each_pose():
         assert np.allclose(rotations[row], joint_rotations(joints, pose), atol=EXACT)
         assert np.allclose(found[row], world_matrices(joints, pose), atol=1e2 * EXACT)
         assert np.array_equal(places[row], placement_matrix(pose))
-    assert np.array_equal(worlds(joints, poses, rotations), found)
+    assert np.array_equal(worlds(joints, pose_arrays(poses), rotations), found)
 
 
 def test_skinning_matrices_depend_on_the_shape():
@@ -388,7 +388,7 @@ def test_skinning_matrices_depend_on_the_shape():
         poses.append(pose)
     body = shaped(figure, poses[0].shape_weights)
     assert body is not figure
-    found = skinning_matrices(worlds(body.skeleton, poses), body.skin.inverse_bind)
+    found = skinning_matrices(worlds(body.skeleton, pose_arrays(poses)), body.skin.inverse_bind)
     for row, pose in enumerate(poses):
         wanted = skinning_matrices(world_matrices(body.skeleton, pose), body.skin.inverse_bind)
         assert np.allclose(found[row], wanted, atol=1e2 * EXACT)

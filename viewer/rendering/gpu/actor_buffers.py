@@ -11,8 +11,10 @@ import moderngl
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
-from viewer.rendering.gpu.program import Programs
-from viewer.rendering.passes.instance_pass import InstanceBuffers
+from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX
+from viewer.rendering.gpu.program import STORAGE_VERSION, Programs
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
@@ -104,8 +106,21 @@ class ActorBuffers:
         while len(kept) > count:
             kept.pop().release()
         while len(kept) < count:
-            kept.append(InstanceBuffers(self.context, self.mesh(figure)))
+            kept.append(InstanceBuffers(self.context, self.programs, self.mesh(figure)))
         return kept
+
+    def groups(self, actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
+        """Return the actors that are drawn together, as many as a storage buffer has room for."""
+        if self.context.version_code < STORAGE_VERSION:
+            return []
+        limit: int = self.context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
+        found: list[list[Actor]] = []
+        for group in instance_groups(actors, options):
+            size = BYTES_PER_VERTEX * self.mesh(group[0].figure).n_vertices
+            most = limit // size
+            if most >= FEWEST:
+                found += (group[start : start + most] for start in range(0, len(group), most))
+        return found
 
     @contextmanager
     def guard(self) -> Iterator[None]:

@@ -44,14 +44,15 @@ class BackFaces:
         """Update to a pose; None for the bind pose."""
         shell = self._mesh.shell
         self._spheres = None
-        if shell is None or not _is_together(shell, figure, how):
+        if shell is None or not is_together(shell, figure, how):
             return
         if pose is None:
             positions = figure.require_mesh().positions
             self._spheres = box_spheres(bounding_box(positions))
             self._borders = positions[shell.borders]
         elif _has_one_side(figure, pose):
-            self._spheres = skin_spheres(figure, pose)
+            palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
+            self._spheres = skin_spheres(figure, palette)
             self._borders = self._posed_borders(figure, pose, how, shell)
 
     def _posed_borders(self, figure: Figure, pose: Pose, how: Skinning, shell: Shell) -> Floats:
@@ -78,9 +79,7 @@ class BackFaces:
         if spheres is None:
             return None
         matrix = projection @ model_view
-        near = matrix[2] + matrix[3]
-        distances = spheres[:, :3] @ near[:3] + near[3] - spheres[:, 3] * np.linalg.norm(near[:3])
-        if not distances.min(initial=np.inf) > 0.0:
+        if not are_before(spheres, matrix):
             return None  # the near plane may cut the surface open
         if not len(self._borders):
             return ()
@@ -97,7 +96,14 @@ class BackFaces:
         return ((left + x, bottom + y, across - x, up - y),) if area else ()
 
 
-def _is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
+def are_before(spheres: Floats, matrix: Floats) -> bool:
+    """Return whether spheres (N, 4) lie before the near plane of a matrix to clip space."""
+    near = matrix[2] + matrix[3]
+    distances = spheres[:, :3] @ near[:3] + near[3] - spheres[:, 3] * np.linalg.norm(near[:3])
+    return bool(distances.min(initial=np.inf) > 0.0)
+
+
+def is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
     """Return whether coincident vertices still coincide before skinning."""
     if not len(shell.copies):
         return True

@@ -7,7 +7,7 @@ import numpy as np
 
 from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
-from viewer.rendering.gpu.upload import buffer, matrix_texture, write_matrices
+from viewer.rendering.gpu.upload import buffer, float32, matrix_texture, write_stacked
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.mesh import bounding_box
@@ -43,7 +43,7 @@ class BoxBuffers:
         matrices[:, :3, 3] -= self.center
         if hides and self.count > _MANY:
             matrices[self._hidden(matrices)] = 0.0
-        write_matrices(self.world, matrices)
+        write_stacked(self.world, float32(matrices[:, :3]))
 
     def _hidden(self, matrices: Floats) -> Bools:
         """Return a mask of boxes that coincide with an earlier one, to collapse them to a point."""

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
+from viewer.rendering.gpu.corrective_sums import CorrectiveSums
 from viewer.rendering.gpu.index_sets import (
     IndexSet,
     curve_order,
@@ -21,10 +21,8 @@ from viewer.rendering.gpu.index_sets import (
 )
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
-from viewer.rendering.gpu.upload import buffer, float32, offset_texture, pair_texture
+from viewer.rendering.gpu.upload import buffer, float32, pair_texture
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import active_rows
-from viewer.rig.bodies.offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Shell, shell_of
 from viewer.rig.mesh import bounding_box, visible_vertices
@@ -57,8 +55,7 @@ class MeshBuffers:
         self._skins: dict[tuple[int, bool], SkinBuffers] = {}
         self._colors: moderngl.Buffer | None = None
         self._shown: tuple[frozenset[int], moderngl.Buffer] | None = None
-        self._offsets: moderngl.Texture | None = None
-        self._product: np.ndarray | None = None
+        self._sums: CorrectiveSums | None = None
         self._shell: tuple[Shell | None] | None = None
         keep = self._owner.keep
         with self._owner.guard():
@@ -205,33 +202,14 @@ class MeshBuffers:
         return self._colors
 
     @property
-    def offsets(self) -> moderngl.Texture:
-        """The pose correctives as a texture, for drivers that sum them in the shader."""
-        if self._offsets is None:
+    def corrective_sums(self) -> CorrectiveSums:
+        """The sums of the figure's pose correctives; it must have some."""
+        if self._sums is None:
             correctives = self.figure.correctives
             assert correctives is not None  # checked by the caller
-            self._offsets = self._owner.keep(offset_texture(self.context, correctives.values()))
-        return self._offsets
-
-    @property
-    def block(self) -> int:
-        """Number of pose correctives that are skipped together, see ``Correctives.block``."""
-        return 1 if self.figure.correctives is None else self.figure.correctives.block
-
-    def summed(self, weights: NDArray[np.floating]) -> np.ndarray:
-        """Return the sums of the pose correctives, (A, 3 V) float32, for weights (A, P)."""
-        correctives = self.figure.correctives
-        assert correctives is not None  # checked by the caller
-        if isinstance(correctives.offsets, SparseOffsets):
-            rows = (correctives.displacement(row).reshape(-1) for row in weights.astype(np.float64))
-            return float32(np.stack([*rows]))
-        if self._product is None:
-            values = correctives.values()
-            self._product = float32(values.reshape(len(values), -1))
-        total = np.zeros((len(weights), self._product.shape[1]), "f4")
-        for run in active_rows(np.abs(weights).max(axis=0), self.block):
-            total += weights[:, run].astype("f4") @ self._product[run]
-        return total
+            self._sums = CorrectiveSums(self.context, correctives, self.sources)
+            self._owner.keep(self._sums)
+        return self._sums
 
     def release(self) -> None:
         """Free every buffer and texture."""
@@ -241,7 +219,7 @@ class MeshBuffers:
 class SkinBuffers:
     """Influences of a mesh's split vertices.
 
-    ``bindings``: one row per split vertex, see ``include/skinning.glsl``. ``joint_fractions``:
+    ``bindings``: one row per split vertex, see ``skin.vert``. ``joint_fractions``:
     (J,), each joint's fraction of the sum of all weights, for the mean motion of the figure.
     """
 
@@ -265,9 +243,8 @@ class SkinBuffers:
                 excess = (weight_sums(skin) - 1.0)[sources]
             # One packed attribute: each attribute costs software drivers as much as a matrix
             # product.
-            bindings = np.empty((len(sources), 4), dtype="u4")
-            bindings[:, :2], bindings[:, 2] = ranges, sources
-            bindings[:, 3] = excess.astype("f4").view("u4")
+            bindings = np.empty((len(sources), 3), dtype="u4")
+            bindings[:, :2], bindings[:, 2] = ranges, excess.astype("f4").view("u4")
             self.bindings = keep(buffer(context, bindings, "u4"))
             stated = None if skin is None else skin.dqs_fractions
             fractions = np.zeros(len(sources)) if stated is None else stated[sources]

@@ -26,6 +26,13 @@ SHADING: dict[Shading, str] = {
 SHADING_CHOICES: dict[Shading, str] = {"auto": "Blinn-Phong, or by material", **SHADING}
 """Available shadings and their labels in menus."""
 
+STORAGE_VERSION = 430
+"""Version of OpenGL with storage buffers and compute shaders; crowds are drawn with them."""
+
+RESTS_BINDING, POSED_BINDING = 0, 1
+"""Bindings of the storage buffers of ``skin.vert`` and ``mesh.vert``."""
+
+_STORAGE_MACROS = {"INSTANCED", "REST_ROWS"}  # macros of shaders that read storage buffers
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
 _INCLUDES = re.compile(r"^#pragma include (\w+)[ \t]*$", re.MULTILINE)
@@ -34,7 +41,9 @@ _LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
-def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
+def set_uniforms(
+    program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, object]
+) -> None:
     """Set uniforms by name; uniforms that the compiler removed as unused are skipped."""
     for name, value in values.items():
         # Not ``name in program``, which compares the names of all members one by one.
@@ -52,56 +61,69 @@ class Programs:
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
-        self._cache: dict[tuple[str | bool, ...], moderngl.Program] = {}
+        self._cache: dict[tuple[tuple[str, ...], ...], moderngl.Program] = {}
+        self._computed: dict[str, moderngl.ComputeShader] = {}
 
     def drawing(
         self,
         name: str,
         chunk: str = "",
         fragment: str = "",
-        skin: str = "",
         geometry: str = "",
-        affine: bool = False,
-        summed: bool = False,
         materials: bool = False,
+        instanced: bool = False,
         effects: tuple[str, ...] = (),
     ) -> moderngl.Program:
-        """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
+        """Return the program of ``name.vert`` and a fragment shader with its chunk.
 
         ``chunk``: a key of ``SHADING``, for fragment shaders with a chunk. ``fragment``: name of
-        the fragment shader; the same name if omitted. ``skin``: a key of ``METHODS``, for vertex
-        shaders that skin. ``geometry``: name of the geometry shader between the two, if any.
-        ``materials``: whether surfaces have more than a base colour texture, see
-        ``include/surface.glsl``. ``effects``: macros of the fragment shader, see ``Effects``.
+        the fragment shader; the same name if omitted. ``geometry``: name of the geometry shader
+        between the two, if any. ``materials``: whether surfaces have more than a base colour
+        texture, see ``include/surface.glsl``. ``instanced``: whether each instance is an actor, see
+        ``mesh.vert``. ``effects``: macros of the fragment shader, see ``Effects``.
         """
-        files = name, skin, fragment or name, chunk, geometry
-        return self._get((*files, affine, summed, materials, *effects), ())
+        both = ("MATERIALS",) if materials else ()
+        files = name, "", fragment or name, chunk, geometry
+        vertex = (*both, "INSTANCED") if instanced else both
+        return self._get(files, vertex, (*both, *effects), ())
 
     def feedback(
-        self,
-        name: str,
-        chunk: str,
-        outputs: tuple[str, ...],
-        affine: bool = False,
-        summed: bool = False,
+        self, name: str, chunk: str, outputs: tuple[str, ...], macros: tuple[str, ...] = ()
     ) -> moderngl.Program:
-        """Return a skinning program without a fragment shader, whose outputs are captured."""
-        return self._get((name, chunk, "", "", "", affine, summed, False), outputs)
+        """Return a program without a fragment shader, whose outputs are captured.
 
-    def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
-        if key not in self._cache:
-            name, skin, fragment_name, chunk, middle = (str(part) for part in key[:5])
-            affine, summed, materials = key[5:8]
-            effects = tuple(str(part) for part in key[8:])
+        ``chunk``: a key of ``METHODS``, for vertex shaders that skin. ``macros``: of the vertex
+        shader, such as those of ``skin.vert``.
+        """
+        return self._get((name, chunk, "", "", ""), macros, (), outputs)
+
+    def compute(self, name: str) -> moderngl.ComputeShader:
+        """Return the compute shader ``name.comp``; the context must have ``STORAGE_VERSION``."""
+        if name not in self._computed:
             files: list[str] = []
-            common = ("MATERIALS",) if materials else ()
-            defines = (*common, "AFFINE_PALETTE") if affine else common
-            defines = (*defines, "SUMMED_OFFSETS") if summed else defines
-            vertex = _compose(f"{name}.vert", skin, files, defines)
-            defines = *common, *effects
-            fragment = (
-                _compose(f"{fragment_name}.frag", chunk, files, defines) if fragment_name else None
-            )
+            text = _compose(f"{name}.comp", "", files)
+            try:
+                with deferred():
+                    self._computed[name] = self.context.compute_shader(text)
+            except moderngl.Error as problem:
+                raise RenderError(self._explain(str(problem), files)) from None
+        return self._computed[name]
+
+    def _get(
+        self,
+        names: tuple[str, str, str, str, str],
+        vertex_macros: tuple[str, ...],
+        fragment_macros: tuple[str, ...],
+        outputs: tuple[str, ...],
+    ) -> moderngl.Program:
+        key = names, vertex_macros, fragment_macros, outputs
+        if key not in self._cache:
+            name, skin, fragment_name, chunk, middle = names
+            files: list[str] = []
+            vertex = _compose(f"{name}.vert", skin, files, vertex_macros)
+            fragment = None
+            if fragment_name:
+                fragment = _compose(f"{fragment_name}.frag", chunk, files, fragment_macros)
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
                 # Both stages output the fragment shader's inputs: the vertex shader's outputs are
@@ -141,7 +163,10 @@ class Programs:
         """Free all programs."""
         for program in self._cache.values():
             program.release()
+        for computed in self._computed.values():
+            computed.release()
         self._cache.clear()
+        self._computed.clear()
 
 
 def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] = ()) -> str:
@@ -152,6 +177,8 @@ def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] =
     files.append(name)
     parts = []
     for number, line in enumerate(resource("shaders", name).read_text("utf-8").splitlines(), 1):
+        if line.startswith("#version") and not _STORAGE_MACROS.isdisjoint(defines):
+            line = f"#version {STORAGE_VERSION}"
         include = _INCLUDE.match(line)
         if include:
             parts.append(_included(include[1], files))

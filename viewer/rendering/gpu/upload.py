@@ -18,7 +18,6 @@ _Numbers: TypeAlias = NDArray[np.generic] | list[float]
 # Fixed texture widths, on which the shaders rely: every OpenGL 3.3 driver allows at least 1024.
 _MATRICES_PER_ROW = 256  # a matrix has three texels
 _PAIRS_PER_ROW = 1024
-_OFFSETS_PER_ROW = 4096
 _RIGID_PER_ROW = 128  # a joint has five texels
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 
@@ -61,19 +60,14 @@ def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
     return _data_texture(context, size, 4, f"{count} joints")
 
 
-def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
-    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure."""
-    # Their affine rows take three texels each, padded to whole rows of the texture.
-    rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
-    rows[: len(matrices)] = matrices[:, :3, :]
-    texture.write(rows.tobytes())
-
-
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
     """Replace the first rows of a texture by consecutive texels, (N, ...), padding the last row."""
     wide = texture.width * texture.components
     flat = rows.reshape(-1)
     height = -(-flat.size // wide)
+    if height == 1:
+        texture.write(flat, viewport=(0, 0, flat.size // texture.components, 1))
+        return
     if flat.size < height * wide:
         flat = np.concatenate([flat, np.zeros(height * wide - flat.size, "f4")])
     texture.write(flat, viewport=(0, 0, texture.width, height))
@@ -85,14 +79,6 @@ def rigid_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
     return _data_texture(context, size, 4, f"{count} joints")
 
 
-def write_rigid(texture: moderngl.Texture, duals: Floats, stretches: Floats) -> None:
-    """Upload (J, 8) dual quaternions and (J, 3, 4) stretches, five texels per joint."""
-    rows = np.zeros((_height(len(duals), _RIGID_PER_ROW) * _RIGID_PER_ROW, 5, 4), "f4")
-    rows[: len(duals), :2] = duals.reshape(-1, 2, 4)
-    rows[: len(duals), 2:] = stretches
-    texture.write(rows.tobytes())
-
-
 def pair_texture(
     context: moderngl.Context, indices: _Numbers, weights: _Numbers
 ) -> moderngl.Texture:
@@ -100,30 +86,12 @@ def pair_texture(
     count = len(indices)
     height = _height(count, _PAIRS_PER_ROW)
     texture = _data_texture(context, (_PAIRS_PER_ROW, height), 2, f"{count} influences")
-    write_pairs(texture, indices, weights)
-    return checked(context, texture, f"{count} influences")
-
-
-def write_pairs(texture: moderngl.Texture, indices: _Numbers, weights: _Numbers) -> None:
-    """Upload (index, weight) pairs into a texture with room for all of them."""
     pairs = np.zeros((texture.width * texture.height, 2), "f4")
     # float32 represents every index below 2^24 exactly.
-    pairs[: len(indices), 0] = indices
-    pairs[: len(indices), 1] = weights
+    pairs[:count, 0] = indices
+    pairs[:count, 1] = weights
     texture.write(pairs.tobytes())
-
-
-def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Texture:
-    """Return a texture of (P, V, 3) offsets, one texel each, in row-major order."""
-    texture = empty_offsets(context, offsets.shape[0] * offsets.shape[1])
-    write_stacked(texture, float32(offsets))
-    return checked(context, texture, f"{offsets.shape[0] * offsets.shape[1]} offsets")
-
-
-def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
-    """Return an empty texture for offsets of vertices, one texel each."""
-    size = (_OFFSETS_PER_ROW, _height(count, _OFFSETS_PER_ROW))
-    return _data_texture(context, size, 3, f"{count} offsets")
+    return checked(context, texture, f"{count} influences")
 
 
 def picture_texture(

@@ -1,34 +1,26 @@
-"""Instanced drawing of actors that share a figure and a shape.
+"""Instanced drawing of actors that share a figure and a shape: one draw for all of them.
 
-No posed vertices are stored: the vertex shader skins each instance with its own row of matrices.
-With software rendering, this is faster than writing posed vertices and reading them back
-(``tests/bench/bench_instances.py``). Every draw repeats the skinning, so views that draw a mesh
-several times use the posed buffers of single actors instead.
+Their posed vertices are in one storage buffer. Actors that did not change are not skinned again,
+and only changed placements are uploaded: the camera is subtracted in the vertex shader.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
+from viewer.rendering.gpu.back_faces import are_before, is_together
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
-from viewer.rendering.gpu.posed_mesh import skinning_options_key
-from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.rest_buffers import SKINNING_SAMPLERS, RestBuffers, SummedOffsets
-from viewer.rendering.gpu.upload import (
-    as_uniform,
-    float32,
-    matrix_texture,
-    reserved,
-    rigid_texture,
-    write_stacked,
-)
+from viewer.rendering.gpu.posed_vertices import PosedVertices, skinning_options_key
+from viewer.rendering.gpu.program import POSED_BINDING, Programs, set_uniforms
+from viewer.rendering.gpu.upload import as_uniform, float32, reserved
 from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
+from viewer.rendering.joint_spheres import skin_spheres, stretch_bounds
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
@@ -41,24 +33,23 @@ from viewer.rendering.passes.mesh_pass import (
 from viewer.rendering.view import View, set_lights
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import is_rigid, skinning_matrices
-from viewer.rig.memo import NumberKey
+from viewer.rig.kinematics import rigid_sizes, skinning_matrices
+from viewer.rig.motion.instances import PoseTable, local_rotations, placements, worlds
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import pose_weights, shaped
-from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rig.skinning import Skinning
 
 FEWEST = 8
 """Minimum number of actors to draw as instances; see ``instance_groups``."""
 
 _PER_INSTANCE = {
-    "in_model_x": 4,
-    "in_model_y": 4,
-    "in_model_z": 4,
+    "in_model_x": 3,
+    "in_model_y": 3,
+    "in_model_z": 3,
+    "in_place": 3,
+    "in_place_rest": 3,
     "in_actor_color": 3,
-    "in_rest_shift": 3,
-    "in_center": 3,
 }
 _FLOATS = sum(_PER_INSTANCE.values())
 _LAYOUT = " ".join(f"{count}f4" for count in _PER_INSTANCE.values())
@@ -66,89 +57,117 @@ _LAYOUT = " ".join(f"{count}f4" for count in _PER_INSTANCE.values())
 
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return groups, of at least ``FEWEST`` actors of one figure and shape, drawn as instances."""
-    # Posed buffers are used instead for small groups, so that camera moves need no re-skinning, and
-    # for translucent actors, actors with hidden parts, outlines or changed materials, and meshes
-    # that are drawn several times per frame, in the bind pose or coloured by a scalar. If back
-    # faces are culled, either all or none of the actors of a group are mirrored, and actors with
-    # mirrored joints are drawn individually.
+    # Translucent actors, actors with hidden parts, outlines or changed materials are drawn one by
+    # one, and so is everything in views that draw lines or values of single vertices.
     if options.show == "binding" or options.shading == "scalar":
         return []
     if options.wireframe or options.normals:
         return []
-    groups: dict[tuple[int, bytes, bool], list[Actor]] = {}
+    kinds: dict[int, _Kind] = {}
+    groups: dict[tuple[int, bytes], list[Actor]] = {}
     for actor in actors:
-        pose, is_opaque = actor.pose, options.opacity * actor.opacity == 1.0
-        is_plain = is_opaque and not actor.hidden_parts and not _has_own_look(actor)
-        if pose is None or not actor.figure.is_attached or not is_plain:
+        pose, figure = actor.pose, actor.figure
+        if pose is None or actor.hidden_parts or options.opacity * actor.opacity != 1.0:
             continue
-        is_mirrored = False
-        materials = actor.figure.require_mesh().materials
-        if options.cull or not all(material.double_sided for material in materials):
-            if (pose.scales < 0.0).any():
-                continue
-            sign = np.linalg.det(actor.placement[:3, :3]) * pose.figure_scale
-            is_mirrored = bool(sign < 0.0)
-        key = id(actor.figure), pose.shape_weights.tobytes(), is_mirrored
-        groups.setdefault(key, []).append(actor)
-    return [group for group in groups.values() if len(group) >= FEWEST]
+        kind = kinds.get(id(figure))
+        if kind is None:
+            kind = kinds[id(figure)] = _kind_of(figure)
+        if not kind.is_plain or (kind.has_binds and pose.shape_weights.any()):
+            continue
+        groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
+    found = [
+        side
+        for (figure, _), group in groups.items()
+        if len(group) >= FEWEST
+        for side in _by_side(group, options.cull or kinds[figure].is_culled)
+    ]
+    return [group for group in found if len(group) >= FEWEST]
 
 
-def _has_own_look(actor: Actor) -> bool:
-    """Return whether outlines are drawn, or expressions may change materials."""
-    shapes, mesh, pose = actor.figure.blend_shapes, actor.figure.require_mesh(), actor.pose
-    if any(material.outline is not None for material in mesh.materials):
-        return True
-    has_binds = shapes is not None and shapes.material_binds is not None
-    return has_binds and pose is not None and bool(pose.shape_weights.any())
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """What decides whether actors of a figure are drawn as instances."""
+
+    is_plain: bool
+    """Whether the figure is skinned, and no material has an outline."""
+    has_binds: bool
+    """Whether expressions may change materials."""
+    is_culled: bool
+    """Whether back faces of a material are not drawn."""
+
+
+def _kind_of(figure: Figure) -> _Kind:
+    shapes, materials = figure.blend_shapes, figure.require_mesh().materials
+    has_outline = any(material.outline is not None for material in materials)
+    return _Kind(
+        figure.is_attached and not has_outline,
+        shapes is not None and shapes.material_binds is not None,
+        not all(material.double_sided for material in materials),
+    )
+
+
+def _by_side(group: list[Actor], is_culled: bool) -> list[list[Actor]]:
+    """Split actors whose placements reflect from the others: their triangles are clockwise."""
+    poses = [actor.require_pose() for actor in group]
+    if is_culled:
+        # Joints that reflect turn only a part of the triangles: such actors are drawn alone.
+        scales = np.concatenate([pose.scales for pose in poses]).reshape(len(group), -1)
+        if (scales < 0.0).any():
+            reflects = (scales < 0.0).any(axis=1)
+            group = [group[row] for row in np.flatnonzero(~reflects).tolist()]
+            poses = [actor.require_pose() for actor in group]
+            if not group:
+                return []
+    linear = _stacked(group)[:, :3, :3]
+    signs = np.linalg.det(linear) * np.array([pose.figure_scale for pose in poses]) < 0.0
+    if not signs.any():
+        return [group]
+    sides = (np.flatnonzero(signs == side).tolist() for side in (False, True))
+    return [[group[row] for row in side] for side in sides]
+
+
+def _stacked(actors: Sequence[Actor]) -> Floats:
+    """Return the actors' placements: (A, 4, 4)."""
+    return np.concatenate([actor.placement for actor in actors]).reshape(-1, 4, 4)
 
 
 def draw_instances(
     programs: Programs,
     instances: InstanceBuffers,
-    actors: Sequence[Actor],
     view: View,
     options: DisplayOptions,
     blended: bool = False,
 ) -> None:
     """Draw the opaque or the blended surfaces of actors that share a mesh."""
     program = programs.drawing(
-        "instance",
-        shading_of(instances.mesh, options),
         "mesh",
-        skin=instances.method,
-        affine=instances.is_affine,
-        summed=instances.has_sums,
+        shading_of(instances.mesh, options),
         materials=instances.mesh.has_materials,
+        instanced=True,
         effects=fragment_macros(instances.mesh, view, options),
     )
-    instances.place(actors, view)
     instances.use(program, view)
     set_lights(program, view, options.lights)
     set_surface(program, instances.mesh, options)
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
-    array = instances.array(program, indices)
-    draw_runs(array, indices, options, instances.count, blended, instances.is_mirrored)
+    array, count = instances.array(program, indices), instances.count
+    # Hidden parts may reveal back faces anywhere.
+    is_whole = not (blended or options.hidden_parts or options.reduced)
+    backs = () if is_whole and instances.hides_backs(view, options.skinning) else None
+    draw_runs(array, indices, options, count, blended, instances.is_mirrored, backs)
 
 
 def draw_instance_shapes(
     programs: Programs,
     instances: InstanceBuffers,
-    actors: Sequence[Actor],
     view: View,
     options: DisplayOptions,
     fragment: str,
     prepare: Prepare,
 ) -> None:
     """Draw instanced surfaces with a fragment shader that shows no colours."""
-    program = programs.drawing(
-        "instance",
-        fragment=fragment,
-        skin=instances.method,
-        affine=instances.is_affine,
-        summed=instances.has_sums,
-        materials=instances.mesh.has_materials,
-    )
-    instances.place(actors, view)
+    materials = instances.mesh.has_materials
+    program = programs.drawing("mesh", fragment=fragment, materials=materials, instanced=True)
     instances.use(program, view)
     set_uniforms(program, {"u_has_tint": has_tints(instances.mesh, options)})
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
@@ -157,170 +176,151 @@ def draw_instance_shapes(
 
 
 class InstanceBuffers:
-    """Matrices, placements and colours of actors that share a figure and a shape."""
+    """Posed vertices, placements and colours of actors that share a figure and a shape.
 
-    # If faces are culled, all placements are reflections, or none.
+    Either all placements reflect, ``is_mirrored``, or none does.
+    """
 
-    def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
+    def __init__(self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers) -> None:
         self.context, self.mesh = context, mesh
         self.count = self.n_updates = 0
         self.is_mirrored = False
-        self._n_joints = mesh.figure.require_skin().n_joints
-        self._rest = RestBuffers(context, mesh, way)
-        self._offsets = SummedOffsets(context, mesh, self._rest.way)
-        self._how = Skinning()
-        self._skinning_key: tuple[object, ...] = ()
-        self._keys: list[NumberKey] = []
-        self._centers: Floats = np.zeros((0, 3))
-        self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
-        self._rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 3, 4), "f4")
-        self._rigid_rows: NDArray[np.float32] = np.zeros((0, self._n_joints, 5, 4), "f4")
-        self._palette: moderngl.Texture | None = None
-        self._rigid: moderngl.Texture | None = None
+        self.vertices = PosedVertices(context, programs, mesh)
+        self._table = PoseTable()
+        self._key: tuple[object, ...] = ()
+        self._figure = mesh.figure
+        self._spheres: Floats = np.zeros((0, 0, 4))
+        self._has_one_side: Bools = np.zeros(0, dtype=np.bool_)
+        self._models: Floats = np.zeros((0, 4, 4))
+        self._placed: tuple[object, ...] = ()
+        self._in_scene: Floats | None = None
         self._instances: moderngl.Buffer | None = None
         self._arrays = VertexArrays(context)
 
-    def update(self, poses: Sequence[Pose], how: Skinning) -> None:
-        """Upload the matrices of poses that changed."""
-        figure = shaped(self.mesh.figure, poses[0].shape_weights)
-        skinning_key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
-        keys = [pose.skinning_key for pose in poses]
-        old = self._keys if skinning_key == self._skinning_key else []
-        changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
-        self._how, self._skinning_key, self.count = how, skinning_key, len(poses)
-        if changed:
-            self._keys = []  # after an error, everything is uploaded again
-            self._reserve(len(poses))
-            # Sums of pose correctives differ between actors and are uploaded separately.
-            self._rest.update(figure, poses[0], replace(how, correctives=False))
-            self._write(figure, [poses[row] for row in changed], np.array(changed))
+    def update(self, actors: Sequence[Actor], how: Skinning) -> None:
+        """Skin the actors whose pose changed, and upload placements that changed."""
+        poses = [actor.require_pose() for actor in actors]
+        changed = self._table.update(poses)
+        key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
+        self.count = len(poses)
+        self.vertices.reserve(self.count)
+        if key != self._key:
+            changed[:] = True
+        if changed.any():
+            self._key = ()  # after an error, all actors are skinned again
+            self._skin(poses, np.flatnonzero(changed), how)
             self.n_updates += 1
-        self._keys = keys
+            self._key = key
+        self._place(actors, poses)
 
-    def _reserve(self, count: int) -> None:
-        """Reserve space; textures grow by half, so that adding actors rarely reallocates."""
-        if self._palette is not None and count <= len(self._rows):
-            return
-        room = max(count, len(self._rows) * 3 // 2)
-        self._release_textures()
-        self._palette = matrix_texture(self.context, room * self._n_joints)
-        self._instances = reserved(self.context, 4 * _FLOATS * room, "instances")
-        more = room - len(self._rows)
-        empty = np.zeros((more, self._n_joints, 5, 4), "f4")
-        self._rows = np.concatenate([self._rows, empty[:, :, :3]])
-        self._rigid_rows = np.concatenate([self._rigid_rows, empty])
-        self._centers = np.concatenate([self._centers, np.zeros((more, 3))])
-        self._is_rigid = np.concatenate([self._is_rigid, np.ones(more, dtype=np.bool_)])
+    def _skin(self, poses: Sequence[Pose], rows: NDArray[np.intp], how: Skinning) -> None:
+        assert self._table.arrays is not None  # just updated
+        figure = shaped(self.mesh.figure, poses[0].shape_weights)
+        skeleton, skin = figure.require_skeleton(), figure.require_skin()
+        arrays = self._table.arrays.rows(rows)
+        rotations = local_rotations(skeleton, arrays)
+        matrices = skinning_matrices(worlds(skeleton, arrays, rotations), skin.inverse_bind)
+        sizes = rigid_sizes(matrices)
+        spheres = skin_spheres(figure, matrices, sizes)
+        if self._spheres.shape[:2] != (self.count, spheres.shape[1]):
+            self._spheres = np.zeros((self.count, *spheres.shape[1:]))
+            self._has_one_side = np.zeros(self.count, dtype=np.bool_)
+        self._spheres[rows] = spheres
+        weights = None
+        if figure.correctives is not None and how.correctives:
+            chosen = [poses[row] for row in rows.tolist()]
+            weights = _pose_weights(figure, chosen, rotations)
+        made = self.vertices.skin(rows, figure, how, matrices, weights, sizes)
+        self._has_one_side[rows] = made.are_rigid
+        self._figure = figure
 
-    def _write(self, figure: Figure, poses: list[Pose], rows: NDArray[np.intp]) -> None:
-        """Upload T(-center') M T(center) for the poses at ``rows``; see ``PosedMesh``."""
-        from viewer.rig.motion.instances import local_rotations, posed_worlds
-
-        skeleton, skin, how = figure.require_skeleton(), figure.require_skin(), self._how
-        assert self._palette is not None
-        rotations = local_rotations(skeleton, poses)
-        palette = skinning_matrices(posed_worlds(skeleton, poses, rotations), skin.inverse_bind)
-        self._is_rigid[rows] = is_rigid(palette)
-        palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
-        fractions = self.mesh.skin(how).joint_fractions
-        moved = np.einsum("j,aji->ai", fractions, palette[..., :3, 3])
-        self._centers[rows] = moved if fractions.any() else self.mesh.center
-        palette[..., :3, 3] -= self._centers[rows, None]
-        method = METHODS[how.method]
-        if method.uses_matrices:
-            self._rows[rows] = palette[..., :3, :]
-            write_stacked(self._palette, self._rows[: self.count])
-        if method.uses_quaternions:
-            from viewer.rig.skinning.dqs import split_palette
-
-            if self._rigid is None:
-                self._rigid = rigid_texture(self.context, len(self._rows) * self._n_joints)
-            binds = np.tile(bind_positions(skin) - self.mesh.center, (len(poses), 1))
-            duals, stretches = split_palette(palette.reshape(-1, 4, 4), binds)
-            shape = (len(poses), self._n_joints)
-            self._rigid_rows[rows, :, :2] = duals.reshape(*shape, 2, 4)
-            self._rigid_rows[rows, :, 2:] = stretches.reshape(*shape, 3, 4)
-            write_stacked(self._rigid, self._rigid_rows[: self.count])
-        weights = _pose_weights(figure, poses, rotations) if how.correctives else None
-        self._offsets.update(weights, rows, self.count)
-
-    def place(self, actors: Sequence[Actor], view: View) -> None:
-        """Upload the actors' placements, relative to a camera, and their colours."""
-        # Products are formed in float64: large translations cancel before the conversion to
-        # float32.
-        from viewer.rig.motion.instances import placements
-
-        assert self._instances is not None  # guaranteed by update
-        poses = [actor.pose for actor in actors if actor.pose is not None]
-        model = view.matrix @ np.stack([actor.placement for actor in actors]) @ placements(poses)
-        self.is_mirrored = bool(np.linalg.det(model[0, :3, :3]) < 0.0)
-        centers = self._centers[: self.count]
-        model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
+    def _place(self, actors: Sequence[Actor], poses: Sequence[Pose]) -> None:
+        """Upload the actors' placements and colours if any changed, or the posed centres did."""
+        models = _stacked(actors) @ placements(poses)
         colors = np.array([actor.color or SKIN_COLOR for actor in actors])
-        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers]
-        self._instances.write(float32(np.concatenate(rows, axis=1)))
+        state = models.tobytes(), colors.tobytes(), self.n_updates
+        if state == self._placed:
+            return
+        self._placed = ()
+        linear = models[:, :3, :3]
+        self.is_mirrored = bool(np.linalg.det(linear[0]) < 0.0)
+        centers = self.vertices.centers[: self.count]
+        places = models[:, :3, 3] + (linear @ centers[..., None])[..., 0]
+        rows = [linear.reshape(-1, 9), *_two_floats(places), colors]
+        data = float32(np.concatenate(rows, axis=1))
+        if self._instances is None or self._instances.size < data.nbytes:
+            self._arrays.release()
+            if self._instances is not None:
+                self._instances.release()
+            self._instances = None
+            self._instances = reserved(self.context, 3 * data.nbytes // 2, "instances")
+        self._instances.write(data)
+        self._models, self._in_scene, self._placed = models, None, state
+
+    def spheres(self) -> Floats:
+        """Return bounds of the vertices in scene space: (A, N, 4), centres and radii."""
+        if self._in_scene is None:
+            linear, shifts = self._models[:, None, :3, :3], self._models[:, None, :3, 3]
+            centers = (linear @ self._spheres[..., :3, None])[..., 0] + shifts
+            radii = self._spheres[..., 3] * stretch_bounds(self._models)[:, None]
+            self._in_scene = np.concatenate([centers, radii[..., None]], axis=-1)
+        return self._in_scene
+
+    @property
+    def largest_scale(self) -> float:
+        """Largest scale of a placement."""
+        return float(stretch_bounds(self._models).max())
+
+    def hides_backs(self, view: View, how: Skinning) -> bool:
+        """Return whether no back face can be seen: all surfaces are closed and before the eye."""
+        shell = self.mesh.shell
+        if shell is None or len(shell.borders) or not is_together(shell, self._figure, how):
+            return False
+        if not self._has_one_side.all():
+            return False
+        return are_before(self.spheres().reshape(-1, 4), view.projection @ view.matrix)
 
     def use(self, program: moderngl.Program, view: View) -> None:
-        """Set the uniforms and textures of ``instance.vert``."""
-        skin = self.mesh.skin(self._how)
+        """Set the uniforms of ``mesh.vert`` for instances, and bind their posed vertices."""
+        linear = view.matrix[:3, :3]
+        origin: Floats = -np.linalg.inv(linear) @ view.matrix[:3, 3]
+        eye, rest = _two_floats(origin)
         values = {
             "u_projection": as_uniform(view.projection),
             "u_orthographic": view.camera.is_parallel,
-            "u_blend_factor": -1.0 if self._how.blend_factor is None else self._how.blend_factor,
-            "u_n_joints": self._n_joints,
-            "u_n_offsets": self._offsets.n_listed,
-            "u_n_sources": len(self.mesh.copies),
-            **SKINNING_SAMPLERS,
+            "u_n_vertices": self.mesh.n_vertices,
+            "u_view": as_uniform(linear),
+            "u_eye": tuple(eye.tolist()),
+            "u_eye_rest": tuple(rest.tolist()),
         }
         set_uniforms(program, values)
-        skin.pairs.use(SKINNING_SAMPLERS["u_pairs"])
-        for texture, name in ((self._palette, "u_palette"), (self._rigid, "u_rigid")):
-            if texture is not None:
-                texture.use(SKINNING_SAMPLERS[name])
-        self._offsets.use()
-
-    @property
-    def method(self) -> str:
-        """The skinning method, a key of ``viewer.rig.skinning.METHODS``."""
-        return self._how.method
-
-    @property
-    def is_affine(self) -> bool:
-        """Whether joints of at least one actor scale or shear."""
-        return not self._is_rigid[: self.count].all()
-
-    @property
-    def has_sums(self) -> bool:
-        """Whether the pose correctives of each actor were summed before the draw."""
-        return self._offsets.has_sums
+        assert self.vertices.posed is not None  # guaranteed by update
+        self.vertices.posed.bind_to_storage_buffer(POSED_BINDING)
 
     def array(
         self, program: moderngl.Program, indices: IndexSet | None = None
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices, it draws single vertices."""
-        mesh, skin = self.mesh, self.mesh.skin(self._how)
         listed = None if indices is None else indices.indices
-        key = (id(listed), id(skin), id(self._rest.positions))
 
         def content() -> list[Source]:
-            own = self._instances, f"{_LAYOUT}/i", *_PER_INSTANCE
-            return [*self._rest.attributes(skin), *mesh.attributes(), own]
+            return [*self.mesh.attributes(), (self._instances, f"{_LAYOUT}/i", *_PER_INSTANCE)]
 
-        index_buffer = None if indices is None else indices.indices
-        return self._arrays.get(program, content, index_buffer, key)
-
-    def _release_textures(self) -> None:
-        self._arrays.release()
-        for item in (self._palette, self._rigid, self._instances):
-            if item is not None:
-                item.release()
-        self._palette = self._rigid = self._instances = None
+        return self._arrays.get(program, content, listed, (id(listed),))
 
     def release(self) -> None:
         """Free the buffers of these actors."""
-        self._release_textures()
-        self._offsets.release()
-        self._rest.release()
+        self._arrays.release()
+        self.vertices.release()
+        if self._instances is not None:
+            self._instances.release()
+        self._instances = None
+
+
+def _two_floats(values: Floats) -> tuple[Floats, Floats]:
+    """Return values as the sum of two float32: the nearest one, and what is left."""
+    nearest = values.astype(np.float32).astype(np.float64)
+    return nearest, values - nearest
 
 
 def _pose_weights(figure: Figure, poses: Sequence[Pose], rotations: Floats) -> Floats | None:

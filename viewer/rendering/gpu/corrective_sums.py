@@ -1,0 +1,173 @@
+"""Sums of pose correctives for many poses at once: on the processor, or by a compute shader.
+
+Both ways are timed once their use has taken long enough, and the faster one is kept: software
+drivers share the processor, which multiplies matrices faster without them. ``viewer doctor
+--bench`` prints both times.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Literal, TypeAlias
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import STORAGE_VERSION, Programs, set_uniforms
+from viewer.rendering.gpu.upload import buffer, float32, reserved
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import Correctives, active_rows
+from viewer.rig.bodies.offsets import SparseOffsets
+
+Way: TypeAlias = Literal["processor", "card"]
+WAYS: tuple[Way, ...] = ("processor", "card")
+"""Methods of summing pose correctives."""
+
+_TRIAL = 0.05  # seconds of sums on the processor after which both ways are timed
+_TRIED = 64  # number of correctives in the trial: enough to outweigh the cost of a call
+_ACTORS, _COLUMNS = 8, 64  # actors per invocation, columns per work group: see correctives.comp
+_Rows: TypeAlias = NDArray[np.float32]
+
+
+class CorrectiveSums:
+    """Sums of the pose correctives of one figure.
+
+    ``sources``: (R,), vertex of the figure for each split vertex. ``way``: the present method.
+    """
+
+    def __init__(self, context: moderngl.Context, correctives: Correctives, sources: Ints) -> None:
+        self.context, self.correctives, self.sources = context, correctives, sources
+        self.way: Way = "processor"
+        self._spent = 0.0
+        self._is_timed = False
+        self._product: _Rows | None = None
+        self._owner = Owner()
+        self._card: tuple[moderngl.Buffer, ...] = ()
+        self._weights: moderngl.Buffer | None = None
+
+    def write(
+        self,
+        programs: Programs,
+        weights: Floats,
+        rest: _Rows,
+        positions: moderngl.Buffer,
+        out: moderngl.Buffer,
+    ) -> None:
+        """Write rest positions with correctives, (A, R, 3) float32, for weights (A, P).
+
+        ``rest``: (V, 3), vertices of the figure; ``positions``: the same, (R, 3) on the GPU.
+        """
+
+        def run(way: Way, weights: Floats) -> None:
+            if way == "card":
+                self._on_card(programs, weights, positions, out)
+            else:
+                self._on_processor(weights, rest, out)
+
+        if self._spent > _TRIAL and not self._is_timed:
+            self._is_timed = True
+            self.way = self._faster(run, weights) if self.can_use_card else "processor"
+        start = time.perf_counter()
+        run(self.way, weights)
+        self._spent += time.perf_counter() - start
+
+    def _faster(self, run: Callable[[Way, Floats], None], weights: Floats) -> Way:
+        """Return the way that sums some of the correctives in less time."""
+        fewer = weights.copy()
+        fewer[:, np.flatnonzero(weights.any(axis=0))[_TRIED:]] = 0.0
+        times = {way: self.seconds(partial(run, way, fewer)) for way in WAYS}
+        if times["card"] < times["processor"]:
+            return "card"
+        self._free_card()
+        return "processor"
+
+    def seconds(self, run: Callable[[], None]) -> float:
+        """Return the time that work takes after a first run, which compiles and uploads."""
+        for _ in range(2):
+            self.context.finish()
+            start = time.perf_counter()
+            run()
+            self.context.finish()
+        return time.perf_counter() - start
+
+    @property
+    def can_use_card(self) -> bool:
+        """Whether the driver has compute shaders and room for the offsets."""
+        if isinstance(self.correctives.offsets, SparseOffsets):
+            return False  # most of the work would be multiplications by 0
+        count, vertices, _ = self.correctives.offsets.shape
+        limit: int = self.context.info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 0)
+        return self.context.version_code >= STORAGE_VERSION and 12 * count * vertices <= limit
+
+    def _on_processor(self, weights: Floats, rest: _Rows, out: moderngl.Buffer) -> None:
+        sums = self._summed(weights).reshape(len(weights), -1, 3)
+        sums += rest
+        out.write(sums.take(self.sources, axis=1))
+
+    def _summed(self, weights: Floats) -> _Rows:
+        """Return the sums of the correctives, (A, 3 V), for weights (A, P)."""
+        correctives = self.correctives
+        if isinstance(correctives.offsets, SparseOffsets):
+            return float32(np.stack([correctives.displacement(row).reshape(-1) for row in weights]))
+        if self._product is None:
+            values = correctives.values()
+            self._product = float32(values.reshape(len(values), -1))
+        total = np.zeros((len(weights), self._product.shape[1]), "f4")
+        for run in active_rows(np.abs(weights).max(axis=0), correctives.block):
+            total += weights[:, run].astype("f4") @ self._product[run]
+        return total
+
+    def _on_card(
+        self,
+        programs: Programs,
+        weights: Floats,
+        positions: moderngl.Buffer,
+        out: moderngl.Buffer,
+    ) -> None:
+        """Run ``correctives.comp``; correctives whose weights are all 0 are not sent."""
+        program, context, keep = programs.compute("correctives"), self.context, self._owner.keep
+        if not self._card:
+            offsets = self.correctives.values()
+            with self._owner.guard():
+                self._card = (
+                    keep(buffer(context, self.sources, "i4")),
+                    keep(buffer(context, offsets, "f4")),
+                )
+        active = np.flatnonzero(np.abs(weights).max(axis=0))
+        count = len(weights)
+        padded = np.zeros((-(-count // _ACTORS) * _ACTORS, len(active)), "f4")
+        padded[:count] = weights[:, active]
+        data = active.astype("i4").tobytes() + padded.tobytes()
+        if self._weights is None or self._weights.size < len(data):
+            if self._weights is not None:
+                self._weights.release()
+            self._weights = None
+            self._weights = reserved(context, len(data), "weights of pose correctives")
+        self._weights.write(data)
+        for binding, item in enumerate((out, positions, *self._card, self._weights)):
+            item.bind_to_storage_buffer(binding)
+        values = {
+            "u_n_actors": count,
+            "u_n_columns": 3 * len(self.sources),
+            "u_n_offsets": 3 * self.correctives.n_vertices,
+            "u_n_active": len(active),
+        }
+        set_uniforms(program, values)
+        columns = -(-3 * len(self.sources) // _COLUMNS)
+        program.run(columns, len(padded) // _ACTORS)
+        context.memory_barrier()
+
+    def _free_card(self) -> None:
+        self._owner.release()
+        self._card = ()
+        if self._weights is not None:
+            self._weights.release()
+        self._weights = None
+
+    def release(self) -> None:
+        """Free every buffer."""
+        self._free_card()

@@ -1,0 +1,222 @@
+"""Posed vertices of actors that share a figure and a shape, skinned by transform feedback.
+
+One instanced draw of a vertex shader skins all actors whose pose changed, once. All passes draw its
+output, so shadows, shading, wireframe and picking need no second skinning.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.rest_buffers import RestBuffers
+from viewer.rendering.gpu.upload import (
+    checked,
+    float32,
+    matrix_texture,
+    rigid_texture,
+    write_stacked,
+)
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import are_alike, rigid_sizes
+from viewer.rig.skin import bind_positions
+from viewer.rig.skinning import METHODS, Skinning
+
+_SAMPLERS = {"u_palette": 0, "u_pairs": 1, "u_rigid": 2, "u_places": 3}
+BYTES_PER_VERTEX = 24
+"""A position and a normal, of three float32 each."""
+
+_MOST_TOGETHER = 1024  # maximum number of actors in one upload
+_MOST_RESTS = 64 << 20  # maximum size of the rest positions with correctives in one upload, bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Palettes:
+    """Joint matrices of C poses about the centres of mesh and pose, for the skinning shader."""
+
+    matrices: Floats
+    """(C, J, 4, 4). T(-posed centre) M T(rest centre)."""
+    centers: Floats
+    """(C, 3). Posed centres, figure space: the mean motion of the figure, by its weights."""
+    sizes: Floats
+    """(C, J). Squares of the joints' scales; see ``rigid_sizes``."""
+
+    @property
+    def are_rigid(self) -> Bools:
+        """Whether the joints of each pose only rotate, with one common scale: (C,)."""
+        return are_alike(
+            self.sizes.min(axis=1, initial=np.inf), self.sizes.max(axis=1, initial=0.0)
+        )
+
+
+class PosedVertices:
+    """Posed vertices of a number of actors.
+
+    ``posed``: R rows for every actor, one per split vertex: position relative to the actor's
+    centre, and unit normal. ``centers``: (A, 3) in figure space. ``n_skinned``: number of actors
+    skinned so far, the same one several times. A framebuffer must be bound while skinning.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers) -> None:
+        self.context, self.programs, self.mesh = context, programs, mesh
+        skin = mesh.figure.skin
+        self._n_joints = skin.n_joints if skin else 0
+        self.size = BYTES_PER_VERTEX * mesh.n_vertices
+        self.posed: moderngl.Buffer | None = None
+        self.centers: Floats = np.zeros((0, 3))
+        self.n_skinned = 0
+        self._textures: dict[str, moderngl.Texture] = {}
+        self._together = max(1, min(_MOST_TOGETHER, _MOST_RESTS // mesh.positions.size))
+        self._room = 0  # number of actors in the textures
+        self._rest = RestBuffers(context, programs, mesh)
+        self._arrays = VertexArrays(context)
+
+    def reserve(self, count: int) -> None:
+        """Make room for actors; if there was none, the vertices of all of them are lost."""
+        if self.posed is not None and count <= len(self.centers):
+            return
+        room = max(count, len(self.centers) * 3 // 2)  # adding actors rarely reallocates
+        if self.posed is not None:
+            self.posed.release()
+        self.posed, self.centers = None, np.zeros((0, 3))
+        what = f"posed vertices of {room * self.size / 1e6:.1f} MB"
+        self.posed = checked(self.context, self.context.buffer(reserve=room * self.size), what)
+        self.centers = np.tile(self.mesh.center, (room, 1))
+        self._free_textures()
+        self._room = min(room, self._together)
+        for name in ("u_palette", "u_places"):
+            self._texture(name)
+
+    def skin(
+        self,
+        rows: NDArray[np.intp],
+        figure: Figure,
+        how: Skinning,
+        matrices: Floats,
+        weights: Floats | None,
+        sizes: Floats | None = None,
+    ) -> Palettes:
+        """Skin the actors ``rows``, (C,) ascending, of one shaped figure.
+
+        ``matrices``: (C, J, 4, 4) skinning matrices, bind to posed; they are changed. ``weights``:
+        (C, P) of the pose correctives, if used. ``sizes``: ``rigid_sizes`` of the matrices, if
+        known.
+        """
+        self._rest.reshape(figure)
+        made = self._about_centers(how, matrices, sizes)
+        self.centers[rows] = made.centers
+        for start in range(0, len(rows), self._together):
+            part = slice(start, start + self._together)
+            self._upload(figure, how, made.matrices[part], made.centers[part])
+            self._rest.correct(None if weights is None else weights[part])
+            self._run(rows[part], how, not made.are_rigid[part].all())
+        return made
+
+    def unpose(self) -> None:
+        """Store the bind pose as the vertices of the first actor."""
+        self._rest.correct(None)
+        self.centers[0] = self.mesh.center
+        places = np.zeros((3, 4), "f4")
+        places[0, :3] = self.mesh.center
+        write_stacked(self._texture("u_places"), places)
+        self._run(np.zeros(1, np.intp), Skinning(), False, attached=False)
+
+    def _about_centers(self, how: Skinning, matrices: Floats, sizes: Floats | None) -> Palettes:
+        if sizes is None:
+            sizes = rigid_sizes(matrices)
+        linear, places = matrices[..., :3, :3], matrices[..., :3, 3]
+        places += linear @ self.mesh.center
+        fractions = self.mesh.skin(how).joint_fractions
+        centers = fractions @ places if fractions.any() else self.mesh.center
+        places -= np.broadcast_to(centers, (len(matrices), 3))[:, None]
+        shape = matrices.shape[:2]
+        return Palettes(
+            matrices, np.broadcast_to(centers, (shape[0], 3)), np.broadcast_to(sizes, shape)
+        )
+
+    def _upload(self, figure: Figure, how: Skinning, matrices: Floats, centers: Floats) -> None:
+        """Upload joint matrices and centres of some actors, the only data that a pose changes."""
+        method, count = METHODS[how.method], len(matrices)
+        if method.uses_matrices:
+            write_stacked(self._texture("u_palette"), float32(matrices[..., :3, :]))
+        if method.uses_quaternions:
+            from viewer.rig.skinning.dqs import split_palette
+
+            binds = bind_positions(figure.require_skin()) - self.mesh.center
+            flat = matrices.reshape(-1, 4, 4)
+            duals, stretches = split_palette(flat, np.tile(binds, (count, 1)))
+            texels = np.concatenate([duals.reshape(-1, 2, 4), stretches], axis=1)
+            write_stacked(self._texture("u_rigid"), float32(texels))
+        places = np.zeros((count, 3, 4), "f4")
+        places[:, 0, :3], places[:, 1, :3] = centers, self.mesh.center - centers
+        write_stacked(self._texture("u_places"), places)
+
+    def _texture(self, name: str) -> moderngl.Texture:
+        if name not in self._textures:
+            make = rigid_texture if name == "u_rigid" else matrix_texture
+            each = 1 if name == "u_places" else self._n_joints
+            self._textures[name] = make(self.context, self._room * each)
+        return self._textures[name]
+
+    def _run(
+        self, rows: NDArray[np.intp], how: Skinning, affine: bool, attached: bool = True
+    ) -> None:
+        """Skin actors whose data are uploaded, those with consecutive rows at once."""
+        rest, skin = self._rest, self.mesh.skin(how)
+        assert self.posed is not None  # ``reserve`` was called
+        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
+        macros = (("AFFINE_PALETTE", affine), ("REST_ROWS", attached and rest.has_rows))
+        used = tuple(macro for macro, is_used in macros if is_used)
+        program = self.programs.feedback("skin", how.method, ("v_position", "v_normal"), used)
+        values = {
+            "u_attached": attached,
+            "u_n_joints": self._n_joints,
+            "u_n_vertices": self.mesh.n_vertices,
+            "u_blend_factor": -1.0 if how.blend_factor is None else how.blend_factor,
+            **_SAMPLERS,
+        }
+        set_uniforms(program, values)
+        for name, texture in self._textures.items():
+            texture.use(_SAMPLERS[name])
+        skin.pairs.use(_SAMPLERS["u_pairs"])
+        rest.use()
+        key = id(skin), attached, rest.version
+        array = self._arrays.get(program, lambda: rest.attributes(skin, attached), key=key)
+        breaks = np.flatnonzero(np.diff(rows) != 1) + 1
+        for first, last in pairwise((0, *breaks.tolist(), len(rows))):
+            set_uniforms(program, {"u_first": first})
+            array.transform(
+                self.posed,
+                mode=moderngl.POINTS,
+                vertices=self.mesh.n_vertices,
+                instances=last - first,
+                buffer_offset=int(rows[first]) * self.size,
+            )
+        self.n_skinned += len(rows)
+
+    def _free_textures(self) -> None:
+        for texture in self._textures.values():
+            texture.release()
+        self._textures.clear()
+
+    def release(self) -> None:
+        """Free everything."""
+        self._arrays.release()
+        self._rest.release()
+        self._free_textures()
+        if self.posed is not None:
+            self.posed.release()
+        self.posed = None
+
+
+def skinning_options_key(how: Skinning) -> tuple[object, ...]:
+    """Return a key that identifies skinning settings."""
+    return (how.method, how.blend_factor, how.max_influences, how.normalize, how.correctives)
