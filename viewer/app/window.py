@@ -33,6 +33,7 @@ from viewer.app.files.recent import (  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
 from viewer.app.native_window import Shell, create_context, create_window  # noqa: E402
+from viewer.app.posing.posing import Posing  # noqa: E402
 from viewer.app.preferences.applying import start_with  # noqa: E402
 from viewer.app.preferences.preferences import load_preferences  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
@@ -192,6 +193,8 @@ class _Window:
         shell.is_dirty = False
         # Threads are polled at intervals only, because drawing frames would slow them down.
         steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
+        drag = state.of(Posing).drag
+        steps |= drag is not None and drag.goes_on
         # An unfinished image is refined in every frame.
         improves = self.frame.pace.is_unfinished
         if is_settling or state.clock.playing or steps or improves:

@@ -168,7 +168,8 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         drag.has_moved = True
         pause_for_edit(state)
     asked = (place, snaps, frame.matrix.tobytes())
-    if drag.has_moved and imgui.is_mouse_pos_valid() and asked != drag.asked:
+    is_asked = asked != drag.asked or drag.goes_on
+    if drag.has_moved and imgui.is_mouse_pos_valid() and is_asked:
         drag.asked = asked
         drag.outcome = drag.handle.follow(frame, place, snaps)
         drag.actor.pose = drag.outcome.pose

@@ -1,8 +1,8 @@
 """Move tool: a joint dragged in the image plane, and arrows that translate the root.
 
-A joint with parents follows the pointer by inverse kinematics, solved from the pose at the start
-of the drag: the result depends on the pointer's position, not on its path. Roots, and joints with
-translation DOFs, are translated.
+A joint with parents follows the pointer by inverse kinematics, solved from the last pose of the
+drag, so that small movements of the pointer change it little. Roots, and joints with translation
+DOFs, are translated.
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
-from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
-from viewer.rig.posing.inverse_kinematics import chain_above, reach
+from viewer.rig.posing.inverse_kinematics import Reaching, chain_above
 from viewer.rig.skeleton import Skeleton, joint_label
 
 LENGTH = 72.0
@@ -26,7 +25,6 @@ LENGTH = 72.0
 _REACH = 7.0  # distance in points within which an arrow can be grabbed
 _SHORTEST = 12.0  # points: arrows that appear shorter point almost at the eye
 _BARE = 14.0  # points from the joint within which an arrow belongs to the joint's handle
-_ITERATIONS = 40  # maximum number of iterations of the solver, which bounds the time per frame
 _MET = 1e-3  # remaining distance above which it is shown, relative to the figure's size
 
 
@@ -102,27 +100,25 @@ class ReachHandle:
     """Handle of a joint that is dragged by inverse kinematics."""
 
     def __init__(self, posed: PosedJoint, start: Pose, place: Place, length: int) -> None:
-        self.posed, self.start, self.place, self.length = posed, start.copy(), place, length
+        self.posed, self.start, self.place = posed, start.copy(), place
         self.joint = posed.joint
+        self._reaching = Reaching(posed.skeleton, start, posed.joint, length)
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
         """Return the pose that moves the joint to the pointer, at its initial depth."""
         target = _dragged(self.posed.center, self.place, frame, place)
-        skeleton = self.posed.skeleton
         inside = np.linalg.solve(self.posed.placement, np.append(target, 1.0))[:3]
-        try:
-            found = reach(skeleton, self.start, self.joint, inside, self.length, _ITERATIONS)
-        except RigError as problem:
-            return Outcome(self.start.copy(), str(problem))
+        found = self._reaching.follow(inside)
         pose = self.start.copy()
         pose.dofs[:] = found.dofs
-        name, limited = joint_label(skeleton, self.joint), tuple(found.limited.tolist())
+        name, limited = joint_label(self.posed.skeleton, self.joint), tuple(found.limited.tolist())
         size = float(np.ptp(self.posed.world[:, :3, 3], axis=0).max()) or 1.0
         scale = float(np.linalg.norm(self.posed.placement[:3, 0]))
         left = found.distance * scale
         if left <= _MET * size:
-            return Outcome(pose, name, limited)
-        return Outcome(pose, f"{name}   {left:.3g} away", limited, target)
+            return Outcome(pose, name, limited, is_settled=found.is_settled)
+        text = f"{name}   {left:.3g} away"
+        return Outcome(pose, text, limited, target, is_settled=found.is_settled)
 
 
 class MoveHandle:

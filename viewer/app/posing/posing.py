@@ -64,6 +64,8 @@ class Outcome:
     """Position of the pointer in scene space, if the joint could not reach it: (3,)."""
     angle: float | None = None
     """Angle of rotation by a ring, radians."""
+    is_settled: bool = True
+    """Whether the pose stays while the pointer rests."""
 
 
 class Handle(Protocol):
@@ -95,6 +97,11 @@ class Drag:
     """Whether the pointer has moved; a click on a handle changes nothing."""
     is_over: bool = False
     """Whether the drag was cancelled and only waits for the release of the button."""
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the pose changes although the pointer rests."""
+        return not self.is_over and not self.outcome.is_settled
 
 
 @dataclass(slots=True)
