@@ -190,6 +190,14 @@ CODES: dict[str, Code] = {
         "body of another model",
         Remedy("open its own model first", "choose its own model (--model, --gender)"),
     ),
+    "C020": Code(
+        "warning", "joint pops", "delete or smooth the keys of these frames (--smooth of convert)"
+    ),
+    "C021": Code("warning", "frozen frames", "delete them, or interpolate between their ends"),
+    "C022": Code("warning", "bones change length", "delete the translation keys of these joints"),
+    "C023": Code("warning", "joints change size", "delete the scale keys unless intended"),
+    "C024": Code("warning", "hyperextended joint", "rotate the joint to its usual side"),
+    "C025": Code("warning", "hand inside the body", "move the arm outwards in these frames"),
     "G001": Code("warning", "inconsistent glTF container", "export the file again"),
     "G002": Code("warning", "inconsistent glTF mesh data", "export the file again"),
     "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),

@@ -41,10 +41,14 @@ CHECKS = {
     "meshes": Check("mesh"),
     "symmetry": Check("symmetry"),
     "clips": Check("clip", of_motion=True, of_animations=True),
+    "pops": Check("pops", of_motion=True, of_animations=True),
+    "frozen": Check("frozen frames", of_motion=True, of_animations=True),
+    "hinges": Check("elbows and knees", of_motion=True, of_animations=True),
+    "stretch": Check("lengths of bones", of_motion=True, of_animations=True),
     "feet": Check("feet", of_motion=True, of_animations=True),
     "captures": Check("captured points", of_motion=True),
     "people": Check("people", of_motion=True),
-    "jitter": Check("jitter", of_motion=True),
+    "jitter": Check("jitter", of_motion=True, of_animations=True),
 }
 """Modules in this folder with a function ``check(subject)``, which yields findings, in order."""
 

@@ -55,6 +55,8 @@ _IndicesLike = NDArray[np.int64] | Ints | list[int]
 _STRAYS = 0.02  # maximum fraction of stray vertices at each end of an axis
 _FAR = 10.0  # strays are ignored if they enlarge the bounding box by more than this factor
 _PROP = 0.1  # relative size of a skeleton below which its mesh determines the size
+_MOST_JOINTS = 0.5  # minimum fraction of the joints that are below one that carries the body
+_STAYS = 1e-3  # relative distance up to which a translation is rounding
 # Frames
 _TOGETHER = 1000  # frames per batch, which limits the memory for their matrices
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
@@ -199,6 +201,12 @@ class Track:
     """(F, J, 3): joints in scene space."""
     rotations: Floats
     """(F, J, 4): local rotations: unit quaternions."""
+    translations: Floats
+    """(F, J, 3): offsets of the joints from their rest translations, relative to the parent."""
+    scales: Floats
+    """(F, J, 3) or (1, J, 3): local scale factors."""
+    per_frame: int
+    """Rows per frame: keyed clips are also evaluated between frames."""
     stepped: Bools
     """(F, J): whether a key without interpolation, of the joint or of an ancestor, is between the
     previous row and this one: such jumps are intended."""
@@ -222,6 +230,10 @@ class Track:
         there = self.numbers[self.present]
         return int(there[-1]) - int(there[0]) + 1 if len(there) else 0
 
+    def on_frames(self) -> Indices:
+        """Return the rows at the frames of the file: (N,)."""
+        return np.arange(0, len(self.times), self.per_frame)
+
     def of_each(self, rows: Indices) -> Indices:
         """Return rows, keeping only the first of each frame: (N,)."""
         _, first = np.unique(self.numbers[rows], return_index=True)
@@ -238,6 +250,17 @@ def track_of(subject: Subject) -> Track | None:
     return subject.tracks[0]
 
 
+def travelling_joints(track: Track, skeleton: Skeleton) -> Ints:
+    """Return the joints that carry the body: roots, and moved joints above most others: (K,)."""
+    moves = np.ptp(track.translations[track.present], axis=0).max(axis=1, initial=0.0)
+    carries, n_below = skeleton.parents < 0, np.ones(skeleton.n_joints)
+    for joint in range(skeleton.n_joints - 1, -1, -1):
+        if skeleton.parents[joint] >= 0:
+            n_below[skeleton.parents[joint]] += n_below[joint]
+    moved = (moves * track.scale > _STAYS * track.size) & (n_below > _MOST_JOINTS * len(n_below))
+    return np.flatnonzero(carries | moved).astype(np.int32)
+
+
 def _track(subject: Subject) -> Track | None:
     actor = subject.actor
     figure, clip, skeleton = actor.figure, actor.joint_motion, actor.figure.skeleton
@@ -245,12 +268,12 @@ def _track(subject: Subject) -> Track | None:
         return None
     if clip.timing is not None:
         timing = clip.timing
-        count = timing.n_frames
+        count, per_frame = timing.n_frames, 1
         times = timing.start + np.arange(count) / timing.frame_rate
         numbers = timing.first_frame + np.arange(count, dtype=np.int32)
     else:
         times = key_times(subject, clip)
-        count = len(times)
+        count, per_frame = len(times), _per_frame(subject, clip)
         numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
     scale = mean_scale(actor.placement)
@@ -281,6 +304,9 @@ def _track(subject: Subject) -> Track | None:
         present=frames.present & _known(subject, clip, count),
         positions=placed,
         rotations=frames.rotations,
+        translations=frames.translations,
+        scales=frames.scales,
+        per_frame=per_frame,
         stepped=_stepped(clip, skeleton, times),
         size=scale * _size(subject, figure),
         scale=scale,
@@ -314,11 +340,16 @@ def _size(subject: Subject, figure: Figure) -> float:
 
 def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
     """Return the times of a keyed clip's frames, and steps between them: (F,), on its clock."""
-    options = subject.options
-    rate = options.frame_rate or clip.frame_rate
-    rate *= max(1, math.ceil(options.rate / rate))
+    rate = subject.options.frame_rate or clip.frame_rate
+    rate *= _per_frame(subject, clip)
     count = min(math.floor((clip.end - clip.start) * rate + _ON_STEP) + 1, _MOST)
     return clip.start + np.arange(count) / rate
+
+
+def _per_frame(subject: Subject, clip: Clip | TransformClip) -> int:
+    """Return the number of times per frame at which a keyed clip is evaluated."""
+    options = subject.options
+    return max(1, math.ceil(options.rate / (options.frame_rate or clip.frame_rate)))
 
 
 def frame_numbers(subject: Subject, times: Floats) -> Ints:

@@ -10,9 +10,18 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding
-from viewer.lint._subject import Indices, Subject, Track, frame_numbers, key_times, track_of
+from viewer.lint._subject import (
+    Indices,
+    Subject,
+    Track,
+    frame_numbers,
+    key_times,
+    track_of,
+    travelling_joints,
+)
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.quaternion import angles_between
 from viewer.rig.motion.clip import SHORTEST, Clip, evaluate_all
 from viewer.rig.motion.timing import Timing
 from viewer.rig.posing.dof_text import beyond_text
@@ -135,10 +144,16 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     fast = _too_fast(track, speeds, limit)
     if fast is None and given is None:
         limit = _LEAPS * track.size
+        rows = track.on_frames()
         flat = [axis for axis in range(3) if axis != (2 if subject.up == "z" else 1)]
-        steps = np.linalg.norm(np.diff(track.positions[..., flat], axis=0), axis=2)
-        speeds[1:] = np.where(track.stepped[1:], 0.0, steps / np.diff(track.times)[:, None])
-        fast = _too_fast(track, _leaps(speeds, skeleton.parents < 0), limit)
+        # Between frames, a keyed clip would show one jump as several steps.
+        steps = np.linalg.norm(np.diff(track.positions[rows][..., flat], axis=0), axis=2)
+        leaps = _leaps(
+            steps / np.diff(track.times[rows])[:, None], travelling_joints(track, skeleton)
+        )
+        speeds[:] = 0.0
+        speeds[rows[1:]] = np.where(track.stepped[rows[1:]], 0.0, leaps)
+        fast = _too_fast(track, speeds, limit)
     if fast is None:
         return
     yield subject.found(
@@ -158,20 +173,19 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     )
 
 
-def _leaps(speeds: Floats, is_root: Bools) -> Floats:
-    """Return (F, J) speeds of roots much slower in the two steps before and after; else 0."""
-    steps = speeds[1:]
-    around = np.pad(steps, ((2, 2), (0, 0)))
-    count = len(steps)
+def _leaps(speeds: Floats, carriers: Ints) -> Floats:
+    """Return speeds (F - 1, J) of carriers much slower two steps before and after; else 0."""
+    around = np.pad(speeds, ((2, 2), (0, 0)))
+    count, is_carrier = len(speeds), np.zeros(speeds.shape[1], dtype=np.bool_)
+    is_carrier[carriers] = True
     others = np.max([around[k : k + count] for k in (0, 1, 3, 4)], axis=0)
-    alone = (others < _SLOWLY * steps) & is_root
-    return np.pad(np.where(alone, steps, 0.0), ((1, 0), (0, 0)))
+    return np.where((others < _SLOWLY * speeds) & is_carrier, speeds, 0.0)
 
 
 def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
     rates = np.zeros((len(track.times), skeleton.n_joints))
-    cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
-    rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
+    steps = angles_between(track.rotations[1:], track.rotations[:-1])
+    rates[1:] = steps / np.diff(track.times)[:, None]
     rates[track.stepped] = 0.0
     fast = _too_fast(track, rates, subject.options.max_rotation)
     if fast is None:

@@ -33,6 +33,9 @@ _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of t
 # Floors of whole motions, as fractions of the figure's height
 _BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
 _LOW_FLOOR, _OTHER_FLOOR = 0.06, 0.25  # depths between which the floor of a capture is too low
+_TOUCHING = 0.3  # minimum fraction of frames in which a foot is on the ground
+_HOPS = 0.8  # seconds; a hop or dodge takes less
+_RARELY = 0.1  # fraction of these frames in which the feet of a body that glides may be slow
 _CARRIED = 0.2  # minimum length of this path, as a fraction of the figure's height
 
 
@@ -236,12 +239,16 @@ def _slipped(
     # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
+    travels = _drifting(subject, track, feet, speeds / track.body, touches, height)
     if not (distances > limits.FAR * track.body).any():
+        yield from travels
         return
     worst = int(distances.argmax())
     is_carried = subject.actor.captured is not None or _is_carried(
         track, worst, slides[:, worst], height
     )
+    if not is_carried:
+        yield from travels
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
     each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
     yield subject.found(
@@ -258,6 +265,36 @@ def _slipped(
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", fastest),
+    )
+
+
+def _drifting(
+    subject: Subject, track: Track, feet: list[int], speeds: Floats, touches: Bools, height: float
+) -> Iterator[Finding]:
+    """Report a body that travels while its feet walk at another speed, or in place."""
+    # A walker travels, and each foot stands for some time; or both feet pass the body on a ground
+    # that moves. If the body travels although no foot ever stands, it glides.
+    rows = np.flatnonzero(touches.any(axis=1))
+    there = np.flatnonzero(track.present)
+    seconds = float(track.times[there[-1]] - track.times[there[0]]) if len(there) else 0.0
+    if seconds < _HOPS or len(rows) < _TOUCHING * len(there):
+        return
+    slowest = np.where(touches, speeds, np.inf).min(axis=1)[rows]
+    path = np.mean([foot.hip for foot in track.paths], axis=0)
+    travel = (path[there[-1]] - path[there[0]]) @ (np.eye(3) - np.diag(axis_vector(subject.up)))
+    distance = float(np.linalg.norm(travel))
+    # Faster than any foot that slides, the body runs or flies.
+    speed = float(np.quantile(slowest, _RARELY))
+    if distance < _CARRIED * height * track.scale or not limits.FAST < speed < limits.SWINGS:
+        return
+    yield subject.found(
+        "C007.travel: the body travels {distance}, but no foot ever stands",
+        distance=subject.length(distance / track.scale),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[track.of_each(rows)],
+        times=track.times[track.of_each(rows)],
+        at=("frames", int(rows[0])),
     )
 
 

@@ -1,4 +1,4 @@
-"""Check of captured motions for jitter: noise from frame to frame."""
+"""Check of motions for jitter: noise from frame to frame, of captures and of single joints."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip, visible_size
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.skeleton import joint_labels
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
 _POINT_LIMIT = 0.02  # noise relative to the median size: triangulated points are noisier
+_WHITE = -0.6  # maximum correlation of successive fourth differences: noise has -0.8
+_ANGLE = np.radians(1.25)  # noise of a joint's rotation that is seen
+_ALONE = 3.0  # minimum ratio to the median of all joints: a noisy recording is noisy everywhere
+_FEWEST = 14  # minimum number of frames in which the noise is known
+_ON_RATE = 1e-3  # tolerance of the frame rate
 _WINDOW = 0.5  # seconds over which noise is averaged: a jump is not jitter
 _SLOWEST = 24.0  # minimum frame rate: with less, people move too far between frames
 # A fourth difference is 0 for any cubic in time, so that a motion whose acceleration changes
@@ -37,6 +43,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     if clip is not None and clip.points is not None:
         yield from _points(subject, clip)
         return
+    yield from _rotations(subject)
     if clip is None or clip.frame_rate < _SLOWEST:
         return
     track = track_of(subject)
@@ -51,6 +58,64 @@ def check(subject: Subject) -> Iterator[Finding]:
         return subject.length(length / scale)
 
     yield from _found(subject, noise, limit, labels, shown, track.numbers, track.times)
+
+
+def _rotations(subject: Subject) -> Iterator[Finding]:
+    """Report joints whose rotations are much noisier than those of the others."""
+    track, skeleton = track_of(subject), subject.actor.figure.skeleton
+    if track is None or skeleton is None:
+        return
+    rows = track.on_frames()
+    if len(rows) < 2:
+        return
+    rate = 1.0 / float(track.times[rows[1]] - track.times[rows[0]])
+    turns = track.rotations[rows].copy()
+    align_signs(turns)
+    moves = np.flatnonzero((turns != turns[0]).any(axis=(0, 2)))
+    if rate < _SLOWEST * (1.0 - _ON_RATE) or len(moves) == 0:
+        return
+    # Close to each other, unit quaternions are half the angle of their rotation apart.
+    noise = noise_of(2.0 * turns[:, moves], track.present[rows], _width(rate))
+    is_measured = noise.any(axis=1)
+    if is_measured.sum() < _FEWEST:
+        return
+    # Hand-made legs twitch for some frames; noise stays.
+    most = np.median(noise[is_measured], axis=0)
+    usual = float(np.median(np.concatenate([most, np.zeros(skeleton.n_joints - len(most))])))
+    limit = max(_ANGLE, _ALONE * usual)
+    columns = np.flatnonzero(most > limit)
+    is_white = [_correlation(turns[:, moves[column]]) < _WHITE for column in columns]
+    columns = columns[is_white]
+    if len(columns) == 0:
+        return
+    columns = columns[np.argsort(-most[columns], kind="stable")]
+    highest = noise[:, columns].max(axis=1)
+    frames = np.flatnonzero(highest > limit)
+    frames = rows[frames[np.argsort(-highest[frames], kind="stable")]]
+    yield subject.found(
+        "C014.rotation: {n}: {joint} jitters by {noise} from frame to frame, most around frame "
+        "{frame}; the median of all joints is {usual}",
+        n=counted(len(frames), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=joint_labels(skeleton)[moves[columns[0]]],
+        noise=f"{np.degrees(most[columns[0]]):.1f}°",
+        usual=f"{np.degrees(usual):.1f}°",
+        frame=int(track.numbers[frames[0]]),
+        part="clip",
+        joints=moves[columns],
+        frames=track.numbers[frames],
+        times=track.times[frames],
+        at=("frames", int(frames[0])),
+    )
+
+
+def _correlation(values: Floats) -> float:
+    """Return the correlation of successive fourth differences of values (F, C)."""
+    # For independent errors, sum_i c_i c_i+1 / sum_i c_i^2 = -56 / 70 = -0.8; for a swing of w
+    # radians per frame, cos w, which is positive unless it takes less than four frames.
+    count = len(values) - 4
+    fourth = np.array([c * values[k : k + count] for k, c in enumerate(_STENCIL)]).sum(axis=0)
+    return float((fourth[1:] * fourth[:-1]).sum() / max((fourth * fourth).sum(), 1e-300))
 
 
 def _points(subject: Subject, clip: PointClip) -> Iterator[Finding]:

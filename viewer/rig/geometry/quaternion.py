@@ -47,6 +47,13 @@ def align_signs(quaternions: Floats) -> None:
         quaternions[1:][is_opposite] *= -1.0
 
 
+def angles_between(first: Floats, second: Floats) -> Floats:
+    """Return the angle between unit quaternions, 2 arccos |q . p|, in radians: (...)."""
+    cosines = np.abs(np.einsum("...q,...q->...", first, second))
+    angles: Floats = 2.0 * np.arccos(np.minimum(cosines, 1.0))
+    return angles
+
+
 def conjugate(quaternions: Floats) -> Floats:
     """Return the inverses (-x, -y, -z, w) of unit quaternions (..., 4)."""
     return quaternions * [-1.0, -1.0, -1.0, 1.0]

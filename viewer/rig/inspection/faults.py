@@ -130,8 +130,8 @@ def _negative(figure: Figure, skin: Skin) -> Iterator[Fault]:
             "W002.negative: {n} (first: {weight} at vertex {vertex} for joint {joint})",
             ("weights", int(vertices[0])),
             values,
-            _distinct(vertices),
-            joints=_distinct(joints),
+            distinct(vertices),
+            joints=distinct(joints),
         )
 
 
@@ -268,7 +268,7 @@ def _labels(figure: Figure, joints: Indices) -> list[str]:
     return [labels[joint] for joint in joints]
 
 
-def _distinct(values: Indices) -> Indices:
+def distinct(values: Indices) -> Indices:
     """Return each value once, in the given order."""
     _, first = np.unique(values, return_index=True)
     return values[np.sort(first)]
