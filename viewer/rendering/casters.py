@@ -11,14 +11,27 @@ from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.joint_spheres import box_spheres, skin_spheres, stretch_bounds
+from viewer.rendering.joint_spheres import (
+    Bounds,
+    bounds_of,
+    box_spheres,
+    skin_spheres,
+    stretch_bounds,
+)
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.view import View
-from viewer.rendering.visibility import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
+from viewer.rendering.visibility import (
+    Meshes,
+    placement_of,
+    shows_mesh,
+    shows_skeleton,
+    with_points,
+    with_skeleton,
+)
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import posed_skeleton
@@ -54,24 +67,27 @@ class Casters:
         """Draw all shapes with a fragment shader that shows no colours."""
         options = self.options
         for actor, mesh in self.meshes.singles:
-            if options.opacity * actor.opacity <= self.threshold:
+            if not self._blocks(actor):
                 continue
             placement = placement_of(actor, options)
             self.mesh_pass.draw_shape(mesh, placement, view, options, fragment, self._prepare)
         for _, instances in self.meshes.instanced:
             how = view, options, fragment, self._prepare
             draw_instance_shapes(self.programs, instances, *how)
-        for actor in self.actors:
-            if options.opacity * actor.opacity <= self.threshold:
-                continue
-            # Over a skin, a skeleton is an overlay and casts no shadow.
-            if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):
+        # Over a skin, a skeleton is an overlay and casts no shadow.
+        for actor in with_skeleton(self.actors, options):
+            if self._blocks(actor) and not shows_mesh(actor.figure, options):
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
                 program = joint_program(self.programs, skeleton, options, "", fragment)
                 draw_joints(program, skeleton, placement, view, options)
-            if has_points(actor, options):
+        for actor in with_points(self.actors, options):
+            if self._blocks(actor):
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
+
+    def _blocks(self, actor: Actor) -> bool:
+        """Return whether an actor is opaque enough to block light in this pass."""
+        return self.options.opacity * actor.opacity > self.threshold
 
     def _prepare(self, program: moderngl.Program, run: MeshRun) -> None:
         """Set the phase of the pattern by which blended surfaces block part of the light."""
@@ -90,18 +106,18 @@ class Casters:
                 sizes.append(mesh_size(actor.figure) * scale)
         return max(sizes, default=0.0)
 
-    def spheres(self) -> list[Floats]:
-        """Return bounding spheres of drawn actors: (A, N, 4) centres and radii, scene space.
-
-        Each array is of one actor, or of several of one figure.
-        """
-        found = [instances.spheres() for _, instances in self.meshes.instanced]
-        found += [spheres_of(actor, self.options)[None] for actor in self._alone()]
-        for actors, _ in self.meshes.instanced:
-            if self.options.show == "both" or any(actor.points is not None for actor in actors):
-                found += [spheres_of(actor, self.options)[None] for actor in actors]
-        kept = (spheres[np.isfinite(spheres).all(axis=(1, 2))] for spheres in found)
-        return [spheres for spheres in kept if spheres.size]
+    def bounds(self) -> list[Bounds]:
+        """Return the bounds of all drawn actors, without those whose pose is not finite."""
+        found = [instances.bounds() for _, instances in self.meshes.instanced]
+        beside = [
+            actor
+            for actors, _ in self.meshes.instanced
+            if self.options.show == "both" or any(actor.points is not None for actor in actors)
+            for actor in actors
+        ]
+        for actor in (*self._alone(), *beside):
+            found.append(bounds_of(spheres_of(actor, self.options)[None]))
+        return [one for one in found if len(one.spheres)]
 
     def _alone(self) -> list[Actor]:
         """Return the drawn actors whose meshes are not drawn as instances."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from viewer.rig.arrays import Floats
@@ -13,11 +15,29 @@ _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do n
 _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
 
 
+class Bounds(NamedTuple):
+    """Bounds of one or several actors."""
+
+    spheres: Floats
+    """(N, 4). Centres and radii that contain them, scene space."""
+    size: float
+    """Largest extent of one actor's centres, scene units."""
+
+
+def bounds_of(spheres: Floats) -> Bounds:
+    """Return the bounds of actors by their spheres (A, N, 4), without those that are not finite."""
+    spheres = spheres[np.isfinite(spheres).all(axis=(1, 2))]
+    if not spheres.size:
+        return Bounds(np.zeros((0, 4)), 0.0)
+    spans = np.ptp(spheres[..., :3], axis=1)
+    return Bounds(spheres.reshape(-1, 4), float(np.linalg.norm(spans, axis=1).max()))
+
+
 def skin_spheres(figure: Figure, palette: Floats, sizes: Floats | None = None) -> Floats:
     """Return bounds of a figure's vertices from its joints: (..., N, 4) centre, radius.
 
-    ``palette``: (..., J, 4, 4) skinning matrices to any space. ``sizes``: their ``rigid_sizes``, if
-    known.
+    ``palette``: (..., J, 4, 4) skinning matrices to any space. ``sizes``: their ``palette_sizes``,
+    if known.
     """
     # A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
     # it lies in the convex hull of spheres around the joints that reach their farthest vertices.
@@ -25,6 +45,7 @@ def skin_spheres(figure: Figure, palette: Floats, sizes: Floats | None = None) -
     centers, radii = _reaches.get(figure, (), lambda: _reaches_of(figure, skin))
     is_rigid = sizes is not None and bool((sizes > 0.0).all())
     stretches = np.sqrt(sizes) if sizes is not None and is_rigid else stretch_bounds(palette)
+    stretches = np.broadcast_to(stretches, palette.shape[:-2])
     used = radii >= 0.0
     if not used.all():
         palette, stretches = palette[..., used, :, :], stretches[..., used]

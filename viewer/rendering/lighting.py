@@ -64,15 +64,14 @@ class Lighting:
         options = casters.options
         if options.quality == "draft":
             return
-        of_actors = casters.spheres()
-        if not of_actors:
+        bounds = casters.bounds()
+        if not bounds:
             return
-        spans = (np.ptp(spheres[..., :3], axis=1) for spheres in of_actors)
-        self._size = max(float(np.linalg.norm(span, axis=1).max()) for span in spans)
+        self._size = max(one.size for one in bounds)
         # All joints of a figure may coincide.
         self._size = self._size or casters.largest_mesh()
         if options.has_shadows and self._size > 0.0:
-            self._spheres = np.concatenate([spheres.reshape(-1, 4) for spheres in of_actors])
+            self._spheres = np.concatenate([one.spheres for one in bounds])
             axes, height = _ground(up, box)
             self._contact = self._contact_pass.draw(
                 casters.draw, self._spheres, self._size, axes, height

@@ -23,13 +23,13 @@ from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.view import View, in_front, set_model
 from viewer.rendering.visibility import (
     has_joint_marks,
-    has_markers,
-    has_points,
     placement_of,
     shows_mesh,
-    shows_skeleton,
     update_meshes,
     update_skeletons,
+    with_markers,
+    with_points,
+    with_skeleton,
 )
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import apply_transform
@@ -103,13 +103,13 @@ class PickPass:
             whose_numbers = [numbers[id(actor)] for actor in actors]
             self._draw_instances(whose_numbers, instances, near, options)
         update_skeletons(self._buffers, scene.actors, options)
-        for index, actor in enumerate(scene.actors):
-            if shows_skeleton(actor, options):
-                self._draw_skeleton(index, actor, near, options)
-            if has_points(actor, options):
-                self._draw_points(index, actor, near, options)
-            if has_markers(actor, options):
-                self._draw_markers(index, actor, near, options)
+        for which, draw in (
+            (with_skeleton, self._draw_skeleton),
+            (with_points, self._draw_points),
+            (with_markers, self._draw_markers),
+        ):
+            for actor in which(scene.actors, options):
+                draw(numbers[id(actor)], actor, near, options)
         return self._read(near)
 
     def _begin(self) -> None:
@@ -187,7 +187,7 @@ class PickPass:
         points = self._buffers.points_of(actor)
         points.update(actor, actor.placement, view, options)
         elements, places, layout = points.elements, actor.points, actor.figure.points
-        assert places is not None and layout is not None  # guaranteed by has_points
+        assert places is not None and layout is not None  # guaranteed by with_points
         if not len(elements):
             return
         program = self._programs.drawing("point", fragment="pick")

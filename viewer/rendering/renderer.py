@@ -35,14 +35,14 @@ from viewer.rendering.visibility import (
     Meshes,
     far_first,
     has_joint_marks,
-    has_markers,
-    has_points,
     placement_of,
     prepare_meshes,
     shows_mesh,
-    shows_skeleton,
     update_meshes,
     update_skeletons,
+    with_markers,
+    with_points,
+    with_skeleton,
 )
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
@@ -157,10 +157,11 @@ class Renderer:
         for actor, mesh in meshes.opaque(options):
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
         draw_image_planes(self.late, scene, view, options, box)
+        index = selected[0]
+        chosen = scene.actors[index] if 0 <= index < len(scene.actors) else None
         skeletons = [
-            (actor, selected[1] if index == selected[0] else -1)
-            for index, actor in enumerate(scene.actors)
-            if shows_skeleton(actor, options)
+            (actor, selected[1] if actor is chosen else -1)
+            for actor in with_skeleton(scene.actors, options)
         ]
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
@@ -173,9 +174,7 @@ class Renderer:
         if any(mesh.is_blended for mesh in meshes.uploaded):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
-        for actor in scene.actors:
-            if not has_points(actor, options):
-                continue
+        for actor in with_points(scene.actors, options):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self.late.draw_motion_paths(scene, view, options, target.size)
@@ -183,13 +182,12 @@ class Renderer:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
                 self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
-        for actor in scene.actors:
-            if has_markers(actor, options):
-                markers = self.buffers.keypoints_of(actor)
-                markers.update(actor.require_pose(), options.skinning)
-                # Marker positions already include the placement of the pose.
-                place, opacity = actor.placement, options.opacity * actor.opacity
-                self.late.keypoint_pass.draw(markers, place, view, options, opacity)
+        for actor in with_markers(scene.actors, options):
+            markers = self.buffers.keypoints_of(actor)
+            markers.update(actor.require_pose(), options.skinning)
+            # Marker positions already include the placement of the pose.
+            place, opacity = actor.placement, options.opacity * actor.opacity
+            self.late.keypoint_pass.draw(markers, place, view, options, opacity)
 
     def _draw_overlays(
         self,
@@ -283,10 +281,9 @@ class Renderer:
             values = [(actor, mesh.scalars) for actor, mesh in meshes.singles]
             self.scalars.update(values, options, (whose, joint), figures)
         update_skeletons(self.buffers, scene.actors, options)
-        for actor in scene.actors:
-            if has_points(actor, options):
-                points = self.buffers.points_of(actor)
-                points.update(actor, actor.placement, view, options)
+        for actor in with_points(scene.actors, options):
+            points = self.buffers.points_of(actor)
+            points.update(actor, actor.placement, view, options)
         return meshes
 
     def _draw_translucent(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:

@@ -82,11 +82,9 @@ def update_skeletons(
 ) -> None:
     """Upload the joint matrices of all drawn skeletons that moved, computed per figure."""
     groups: dict[tuple[int, bytes], list[tuple[Actor, Pose]]] = {}
-    for actor in actors:
+    for actor in with_skeleton(actors, options):
         pose = actor.pose
-        if pose is None or not shows_skeleton(actor, options):
-            continue
-        if not buffers.skeleton(actor).is_current(pose, options):
+        if pose is not None and not buffers.skeleton(actor).is_current(pose, options):
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
@@ -107,29 +105,53 @@ def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
 
 def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
     """Return whether an actor's joint boxes are drawn."""
-    figure = actor.figure
-    wanted = options.show in ("skeleton", "both") or figure.mesh is None
-    return actor.is_drawn and figure.skeleton is not None and wanted
+    return bool(with_skeleton([actor], options))
 
 
-def has_markers(actor: Actor, options: DisplayOptions) -> bool:
-    """Return whether the keypoints of an actor's figure are drawn."""
-    if not options.keypoints or options.show == "binding" or actor.pose is None:
-        return False
-    return actor.is_drawn and actor.figure.keypoints is not None
+def with_skeleton(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors whose joint boxes are drawn."""
+    # Among a thousand actors, the first condition is usually the last.
+    wanted = options.show in ("skeleton", "both")
+    return [
+        actor
+        for actor in actors
+        if (wanted or actor.figure.mesh is None)
+        and actor.is_drawn
+        and actor.figure.skeleton is not None
+    ]
+
+
+def has_points(actor: Actor, options: DisplayOptions) -> bool:
+    """Return whether an actor's captured points are drawn."""
+    return bool(with_points([actor], options))
+
+
+def with_points(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors whose captured points are drawn."""
+    if not options.captured_keypoints:
+        return []
+    return [
+        actor
+        for actor in actors
+        if actor.points is not None and actor.is_drawn and actor.figure.points is not None
+    ]
+
+
+def with_markers(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors with a figure whose keypoints are drawn."""
+    if not options.keypoints or options.show == "binding":
+        return []
+    return [
+        actor
+        for actor in actors
+        if actor.figure.keypoints is not None and actor.is_drawn and actor.pose is not None
+    ]
 
 
 def has_joint_marks(options: DisplayOptions) -> bool:
     """Return whether joint marks are drawn in addition to boxes."""
     wanted = options.joint_names or options.joint_axes or options.xray
     return wanted and options.show != "binding"
-
-
-def has_points(actor: Actor, options: DisplayOptions) -> bool:
-    """Return whether an actor's captured points are drawn."""
-    if not options.captured_keypoints or not actor.is_drawn:
-        return False
-    return actor.figure.points is not None and actor.points is not None
 
 
 def placement_of(actor: Actor, options: DisplayOptions) -> Floats:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.transform import affine_matrices
+from viewer.rig.memo import Memo
 from viewer.rig.pose import Pose, PosedSkeleton, joint_rotations, local_transforms, zero_pose
 from viewer.rig.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from viewer.rig.skin import Skin
 
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
 # normals by at most half of it, in radians.
@@ -19,6 +24,7 @@ _RIGID = 1e-5
 _MOST_JOINTS = 4096  # maximum number of joints of hierarchies whose passes are cached
 
 Indices = NDArray[np.intp]
+_bind_sizes: Memo[Skin, Floats] = Memo()
 
 
 def forward_kinematics(parents: Ints, local: Floats) -> Floats:
@@ -129,6 +135,14 @@ def rigid_sizes(palette: Floats) -> Floats:
     with np.errstate(over="ignore", invalid="ignore"):  # of matrices that are not uniform
         is_uniform &= a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
     return np.where(is_uniform, squares, 0.0)
+
+
+def palette_sizes(skin: Skin, scales: Floats, palette: Floats) -> Floats:
+    """Return ``rigid_sizes`` of skinning matrices (..., J, 4, 4) of poses with local scales."""
+    if not (scales == 1.0).all():
+        return rigid_sizes(palette)
+    # Products of rotations and the bind matrices are as large as these.
+    return _bind_sizes.get(skin, None, lambda: rigid_sizes(skin.inverse_bind))
 
 
 def are_alike(lowest: Floats, highest: Floats) -> Bools:

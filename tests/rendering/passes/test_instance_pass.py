@@ -1,5 +1,6 @@
 """Actors drawn as instances, compared with the float64 reference and images of single actors."""
 
+from collections import Counter
 from dataclasses import replace
 
 import moderngl
@@ -11,9 +12,10 @@ import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu import posed_vertices
+from viewer.rendering.gpu import actor_buffers, posed_vertices
 from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
@@ -321,3 +323,110 @@ def test_point_figures_are_drawn_with_all_options(offscreen):
         options = DisplayOptions(**changes)
         camera = default_camera(scene, (60, 60))
         assert offscreen.render(scene, (60, 60), camera, options, scene_box(scene)).any()
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """The driver's work since the last ``clear``: draws, skinned actors and uploaded bytes."""
+    done = Counter()
+
+    def count(owner, name, measure) -> None:
+        original = getattr(owner, name)
+
+        def counted(self, *args, **keywords):
+            done[name] += measure(*args, **keywords)
+            return original(self, *args, **keywords)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    count(moderngl.VertexArray, "render", lambda *_, **__: 1)
+    count(moderngl.VertexArray, "transform", lambda *_, instances, **__: instances)
+    for owner in (moderngl.Buffer, moderngl.Texture):
+        count(owner, "write", lambda data, *_, **__: memoryview(data).nbytes)
+    return done
+
+
+def crowd(count: int) -> Scene:
+    """Return bent arms of one figure in rows."""
+    figure = arm(3)
+    actors = [bent(figure, (1, "z", 0.001 * number)) for number in range(count)]
+    for number, actor in enumerate(actors):
+        actor.placement[:3, 3] = 4.0 * (number % 32), 0.0, 4.0 * (number // 32)
+    return Scene(actors)
+
+
+@pytest.mark.parametrize("quality", ["draft", "normal"])
+def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, quality):
+    size, options, draws = (64, 48), DisplayOptions(quality=quality), {}
+    for count in (10, 250):
+        scene = crowd(count)
+        box = scene_box(scene)
+        for turn in range(3):  # the second image of a size stores its background
+            work.clear()
+            camera = default_camera(scene, size)
+            camera.azimuth += 10.0 * turn
+            offscreen.render(scene, size, camera, options, box)
+        assert work["transform"] == work["write"] == 0
+        draws[count] = work["render"]
+    assert draws[10] == draws[250]
+
+
+def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
+    scene, size = crowd(100), (64, 48)
+    camera, box = default_camera(scene, size), scene_box(scene)
+
+    def draw(quality) -> dict[str, int]:
+        work.clear()
+        offscreen.render(scene, size, camera, DisplayOptions(quality=quality), box)
+        return dict(work)
+
+    assert draw("normal")["transform"] == 100
+    for number in (3, 4, 50):
+        scene.actors[number].pose.dofs[3] += 0.1
+    done = draw("normal")  # once for all passes
+    assert done["transform"] == 3
+    # Of each, 3 matrices and its centres, three rows of four floats each; then the placements and
+    # colours of all actors, 18 floats each, as posed centres are part of the placements.
+    assert done["write"] == 3 * 4 * 48 + 100 * 18 * 4
+    scene.actors[7].placement[0, 3] += 0.5
+    done = draw("normal")
+    assert (done.get("transform", 0), done["write"]) == (0, 100 * 18 * 4)
+    assert draw("final").get("write", 0) == 0
+
+
+def test_groups_that_exceed_a_storage_buffer_are_split(offscreen, monkeypatch):
+    scene = crowd(40)
+    camera, box, options = default_camera(scene, (64, 48)), scene_box(scene), DisplayOptions()
+    whole = offscreen.render(scene, (64, 48), camera, options, box)
+    mesh = offscreen.renderer.buffers.mesh(scene.actors[0].figure)
+    limit = 10 * BYTES_PER_VERTEX * mesh.n_vertices
+    limits = {**offscreen.context.info, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE": limit + 1}
+    monkeypatch.setattr(moderngl.Context, "info", property(lambda self: limits))
+    groups = offscreen.renderer.buffers.groups(scene.actors, options)
+    assert [len(group) for group in groups] == [10, 10, 10, 10]
+    split = offscreen.render(scene, (64, 48), camera, options, box)
+    np.testing.assert_array_equal(split, whole)
+
+
+def test_drivers_without_storage_buffers_draw_actors_one_by_one(offscreen, monkeypatch):
+    scene, size = rows_of_arms(FEWEST), (100, 75)
+    camera, box = default_camera(scene, size), scene_box(scene)
+    together = offscreen.render(scene, size, camera, DisplayOptions(), box)
+    monkeypatch.setattr(actor_buffers, "STORAGE_VERSION", 10_000)
+    assert offscreen.renderer.buffers.groups(scene.actors, DisplayOptions()) == []
+    alone = offscreen.render(scene, size, camera, DisplayOptions(), box)
+    assert (np.abs(together.astype(int) - alone).max(axis=-1) > 2).mean() < 0.001
+
+
+def test_crowd_far_from_the_origin_looks_as_near_it(offscreen):
+    pictures = []
+    for far in (0.0, 1e6):
+        scene = crowd(FEWEST)
+        for actor in scene.actors:
+            actor.placement[:3, 3] += far
+        camera = default_camera(scene, (120, 90))
+        options, box = DisplayOptions(grid=False), scene_box(scene)
+        pictures.append(offscreen.render(scene, (120, 90), camera, options, box))
+    near, far = (picture.astype(int) for picture in pictures)
+    # float64 itself resolves 1e-10 there; float32 would be off by 0.06.
+    assert (np.abs(near - far).max(axis=-1) > 2).mean() < 0.002

@@ -51,6 +51,7 @@ class ActorBuffers:
         self.context, self.programs, self._cube, self._notes = context, programs, cube, notes
         self._forget = forget
         self.meshes: Kept[Figure, MeshBuffers] = Kept()
+        self._state: tuple[Sequence[Actor], list[Figure], int] = [], [], 0
         self._instanced: Kept[Figure, _InstancedShapes] = Kept()
         self.posed: Kept[Actor, PosedMesh] = Kept()
         self.skeletons: Kept[Actor, SkeletonBuffers] = Kept()
@@ -133,9 +134,17 @@ class ActorBuffers:
 
     def keep_only(self, actors: Sequence[Actor]) -> None:
         """Free the buffers of removed actors and of unused figures."""
+        figures = [actor.figure for actor in actors]
+        if (actors, figures, self._n_kept()) == self._state:
+            return  # nothing was made since, and a thousand actors need not be looked up
         self.posed.keep_only(actors, self._forget)
         for kept in (self.skeletons, self.keypoints, self.points, self.motion_paths):
             kept.keep_only(actors)
-        figures = [actor.figure for actor in actors]
         self._instanced.keep_only(figures)
         self.meshes.keep_only(figures)
+        self._state = list(actors), figures, self._n_kept()
+
+    def _n_kept(self) -> int:
+        of_actors = len(self.posed) + len(self.skeletons) + len(self.keypoints)
+        of_actors += len(self.points) + len(self.motion_paths)
+        return of_actors + len(self._instanced) + len(self.meshes)

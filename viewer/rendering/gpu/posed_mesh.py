@@ -19,7 +19,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.scalar_quantities import ScalarBuffer
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import posed_skeleton
+from viewer.rig.kinematics import palette_sizes, posed_skeleton
 from viewer.rig.pose import Pose
 from viewer.rig.shape import pose_weights, shaped
 from viewer.rig.skinning import Skinning
@@ -89,7 +89,8 @@ class PosedMesh:
         weights: Floats | None = None
         if figure.correctives is not None and how.correctives:
             weights = pose_weights(figure.correctives, skeleton, pose)[None]
-        made = self._vertices.skin(_ALONE, figure, how, matrices, weights)
+        sizes = palette_sizes(skin, pose.scales, matrices)
+        made = self._vertices.skin(_ALONE, figure, how, matrices, weights, sizes)
         if not made.are_rigid[0]:
             signs = np.sign(np.linalg.det(matrices[0, :, :3, :3]))
             self._is_mirrored = bool(self.mesh.skin(how).joint_fractions @ signs < 0.0)

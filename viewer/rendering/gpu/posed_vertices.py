@@ -26,7 +26,7 @@ from viewer.rendering.gpu.upload import (
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import are_alike, rigid_sizes
+from viewer.rig.kinematics import are_alike
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 
@@ -102,13 +102,12 @@ class PosedVertices:
         how: Skinning,
         matrices: Floats,
         weights: Floats | None,
-        sizes: Floats | None = None,
+        sizes: Floats,
     ) -> Palettes:
         """Skin the actors ``rows``, (C,) ascending, of one shaped figure.
 
         ``matrices``: (C, J, 4, 4) skinning matrices, bind to posed; they are changed. ``weights``:
-        (C, P) of the pose correctives, if used. ``sizes``: ``rigid_sizes`` of the matrices, if
-        known.
+        (C, P) of the pose correctives, if used. ``sizes``: ``palette_sizes`` of the matrices.
         """
         self._rest.reshape(figure)
         made = self._about_centers(how, matrices, sizes)
@@ -129,9 +128,7 @@ class PosedVertices:
         write_stacked(self._texture("u_places"), places)
         self._run(np.zeros(1, np.intp), Skinning(), False, attached=False)
 
-    def _about_centers(self, how: Skinning, matrices: Floats, sizes: Floats | None) -> Palettes:
-        if sizes is None:
-            sizes = rigid_sizes(matrices)
+    def _about_centers(self, how: Skinning, matrices: Floats, sizes: Floats) -> Palettes:
         linear, places = matrices[..., :3, :3], matrices[..., :3, 3]
         places += linear @ self.mesh.center
         fractions = self.mesh.skin(how).joint_fractions

@@ -20,7 +20,7 @@ from viewer.rendering.gpu.posed_vertices import PosedVertices, skinning_options_
 from viewer.rendering.gpu.program import POSED_BINDING, Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform, float32, reserved
 from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
-from viewer.rendering.joint_spheres import skin_spheres, stretch_bounds
+from viewer.rendering.joint_spheres import Bounds, bounds_of, skin_spheres, stretch_bounds
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
@@ -33,7 +33,7 @@ from viewer.rendering.passes.mesh_pass import (
 from viewer.rendering.view import View, set_lights
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import rigid_sizes, skinning_matrices
+from viewer.rig.kinematics import palette_sizes, skinning_matrices
 from viewer.rig.motion.instances import PoseTable, local_rotations, placements, worlds
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
@@ -193,7 +193,7 @@ class InstanceBuffers:
         self._has_one_side: Bools = np.zeros(0, dtype=np.bool_)
         self._models: Floats = np.zeros((0, 4, 4))
         self._placed: tuple[object, ...] = ()
-        self._in_scene: Floats | None = None
+        self._bounds: Bounds | None = None
         self._instances: moderngl.Buffer | None = None
         self._arrays = VertexArrays(context)
 
@@ -220,7 +220,7 @@ class InstanceBuffers:
         arrays = self._table.arrays.rows(rows)
         rotations = local_rotations(skeleton, arrays)
         matrices = skinning_matrices(worlds(skeleton, arrays, rotations), skin.inverse_bind)
-        sizes = rigid_sizes(matrices)
+        sizes = palette_sizes(skin, arrays.scales, matrices)
         spheres = skin_spheres(figure, matrices, sizes)
         if self._spheres.shape[:2] != (self.count, spheres.shape[1]):
             self._spheres = np.zeros((self.count, *spheres.shape[1:]))
@@ -255,16 +255,16 @@ class InstanceBuffers:
             self._instances = None
             self._instances = reserved(self.context, 3 * data.nbytes // 2, "instances")
         self._instances.write(data)
-        self._models, self._in_scene, self._placed = models, None, state
+        self._models, self._bounds, self._placed = models, None, state
 
-    def spheres(self) -> Floats:
-        """Return bounds of the vertices in scene space: (A, N, 4), centres and radii."""
-        if self._in_scene is None:
+    def bounds(self) -> Bounds:
+        """Return the bounds of the vertices in scene space."""
+        if self._bounds is None:
             linear, shifts = self._models[:, None, :3, :3], self._models[:, None, :3, 3]
             centers = (linear @ self._spheres[..., :3, None])[..., 0] + shifts
             radii = self._spheres[..., 3] * stretch_bounds(self._models)[:, None]
-            self._in_scene = np.concatenate([centers, radii[..., None]], axis=-1)
-        return self._in_scene
+            self._bounds = bounds_of(np.concatenate([centers, radii[..., None]], axis=-1))
+        return self._bounds
 
     @property
     def largest_scale(self) -> float:
@@ -276,9 +276,10 @@ class InstanceBuffers:
         shell = self.mesh.shell
         if shell is None or len(shell.borders) or not is_together(shell, self._figure, how):
             return False
-        if not self._has_one_side.all():
+        bounds = self.bounds()
+        if not self._has_one_side.all() or len(bounds.spheres) < self._spheres[..., 0].size:
             return False
-        return are_before(self.spheres().reshape(-1, 4), view.projection @ view.matrix)
+        return are_before(bounds.spheres, view.projection @ view.matrix)
 
     def use(self, program: moderngl.Program, view: View) -> None:
         """Set the uniforms of ``mesh.vert`` for instances, and bind their posed vertices."""

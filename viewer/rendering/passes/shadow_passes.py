@@ -108,13 +108,13 @@ class ContactPass:
         """Draw the contact shadows of figures in (N, 4); None if all are far above the ground."""
         # The size of a figure determines the softness. The axes, (3, 3), are the ground's two axes
         # and the up axis as rows.
-        centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
-        near = (centers - radii)[:, 2] < height + _FAR * size
+        centers, radii = axes @ spheres[:, :3].T, spheres[:, 3]
+        near = centers[2] - radii < height + _FAR * size
         if not near.any():
             return None
         margin = 3.0 * _WIDE * size
-        low = (centers - radii)[near, :2].min(axis=0) - margin
-        high = (centers + radii)[near, :2].max(axis=0) + margin
+        low = (centers - radii)[:2, near].min(axis=1) - margin
+        high = (centers + radii)[:2, near].max(axis=1) + margin
         # Seen from below, the first axis points right and the second one down.
         below = np.stack([axes[0], -axes[1], -axes[2]])
         bottom, top = height - _BELOW * size, height + _FAR * size
@@ -260,8 +260,9 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     # Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
     # not crawl while figures move.
     axes = np.stack([*light_axes(direction), direction])
-    centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
-    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+    # Rows are contiguous, so that the extremes of many spheres are found quickly.
+    centers, radii = axes @ spheres[:, :3].T, spheres[:, 3]
+    low, high = (centers - radii).min(axis=1), (centers + radii).max(axis=1)
     half = 0.5 * max(high[0] - low[0], high[1] - low[1])
     # This leaves half a texel for snapping, and room for the filter.
     half /= 1.0 - 2.0 * (_MARGIN + 1.0) / side

@@ -39,19 +39,24 @@ class PoseArrays(NamedTuple):
         return PoseArrays(*(part[rows] for part in self))
 
 
-def pose_arrays(poses: Sequence[Pose]) -> PoseArrays:
-    """Gather the values of poses."""
+def pose_arrays(poses: Sequence[Pose], into: PoseArrays | None = None) -> PoseArrays:
+    """Gather the values of poses, in the memory of other ones of the same shape if given."""
     parts = (
         [pose.dofs for pose in poses],
         [pose.translations for pose in poses],
         [pose.rotations for pose in poses],
         [pose.scales for pose in poses],
     )
-    # One concatenation per part takes a fifth of the time of np.stack.
-    shapes = ((len(poses), *part[0].shape) for part in parts)
-    return PoseArrays(
-        *(np.concatenate(part).reshape(shape) for part, shape in zip(parts, shapes, strict=True))
-    )
+    found = []
+    for number, part in enumerate(parts):
+        shape = (len(poses), *part[0].shape)
+        known = None if into is None else into[number]
+        if known is None or known.shape != shape:
+            known = np.empty(shape)
+        # One concatenation per part takes a fifth of the time of np.stack.
+        np.concatenate(part, out=known.reshape(-1, *shape[2:]))
+        found.append(known)
+    return PoseArrays(*found)
 
 
 class PoseTable:
@@ -59,11 +64,12 @@ class PoseTable:
 
     def __init__(self) -> None:
         self.arrays: PoseArrays | None = None
+        self._spare: PoseArrays | None = None
         self._bytes: tuple[bytearray, ...] = ()
 
     def update(self, poses: Sequence[Pose]) -> Bools:
         """Gather the values of poses into ``arrays``; return which differ from before, (A,)."""
-        new, old = pose_arrays(poses), self.arrays
+        new, old = pose_arrays(poses, self._spare), self.arrays
         if old is None or any(a.shape != b.shape for a, b in zip(new, old, strict=True)):
             changed = np.ones(len(poses), dtype=np.bool_)
         else:
@@ -73,9 +79,10 @@ class PoseTable:
                 if part.size and known != part:
                     bits = part.reshape(len(poses), -1).view(np.int64)
                     changed |= (bits != before.reshape(len(poses), -1).view(np.int64)).any(axis=1)
+        self._spare = new
         if changed.any():
             self._bytes = tuple(map(bytearray, new))
-            self.arrays = new
+            self.arrays, self._spare = new, old
         return changed
 
 
