@@ -350,6 +350,30 @@ def _frames() -> Iterator[Measured]:
             times = _interleaved(work, rounds)
             ratio = _ratio(times["moved"], times["still"])
             yield Measured(f"frame of {subject}", _median(times["moved"]), ratio, base)
+        yield from _correctives(offscreen, crowd)
+
+
+def _correctives(offscreen: Offscreen, crowd: Scene) -> Iterator[Measured]:
+    """Measure the sums of pose correctives in both ways; playback uses the faster one."""
+    import numpy as np
+
+    from viewer.rendering.gpu.rest_buffers import RestBuffers
+    from viewer.rig.shape import pose_weights
+
+    figure = crowd.actors[0].figure
+    assert figure.correctives is not None  # of the bundled body
+    skeleton, poses = figure.require_skeleton(), [actor.require_pose() for actor in crowd.actors]
+    weights = np.stack([pose_weights(figure.correctives, skeleton, pose) for pose in poses])
+    with offscreen.context:
+        renderer = offscreen.renderer
+        rest = RestBuffers(offscreen.context, renderer.programs, renderer.buffers.mesh(figure))
+        times = rest.corrective_times(weights)
+        rest.release()
+    processor = times["processor"]
+    for way, seconds in times.items():
+        ratio = 0.0 if way == "processor" else seconds / processor
+        subject = f"pose correctives of {len(poses)} bodies, {way}"
+        yield Measured(subject, 1e3 * seconds, ratio, "the processor" if ratio else "")
 
 
 def _drawn(

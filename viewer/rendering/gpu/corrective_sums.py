@@ -7,9 +7,8 @@ drivers share the processor, which multiplies matrices faster without them. ``vi
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
-from functools import partial
 from typing import Literal, TypeAlias
 
 import moderngl
@@ -61,38 +60,51 @@ class CorrectiveSums:
 
         ``rest``: (V, 3), vertices of the figure; ``positions``: the same, (R, 3) on the GPU.
         """
-
-        def run(way: Way, weights: Floats) -> None:
-            if way == "card":
-                self._on_card(programs, weights, positions, out)
-            else:
-                self._on_processor(weights, rest, out)
-
         if self._spent > _TRIAL and not self._is_timed:
             self._is_timed = True
-            self.way = self._faster(run, weights) if self.can_use_card else "processor"
+            fewer = weights.copy()
+            fewer[:, np.flatnonzero(weights.any(axis=0))[_TRIED:]] = 0.0
+            times = self.times(programs, fewer, rest, positions, out)
+            if times.get("card", math.inf) < times["processor"]:
+                self.way = "card"
+            else:
+                self._free_card()
         start = time.perf_counter()
-        run(self.way, weights)
+        self._run(self.way, programs, weights, rest, positions, out)
         self._spent += time.perf_counter() - start
 
-    def _faster(self, run: Callable[[Way, Floats], None], weights: Floats) -> Way:
-        """Return the way that sums some of the correctives in less time."""
-        fewer = weights.copy()
-        fewer[:, np.flatnonzero(weights.any(axis=0))[_TRIED:]] = 0.0
-        times = {way: self.seconds(partial(run, way, fewer)) for way in WAYS}
-        if times["card"] < times["processor"]:
-            return "card"
-        self._free_card()
-        return "processor"
+    def times(
+        self,
+        programs: Programs,
+        weights: Floats,
+        rest: _Rows,
+        positions: moderngl.Buffer,
+        out: moderngl.Buffer,
+    ) -> dict[Way, float]:
+        """Return the seconds that ``write`` takes in each way that the driver offers."""
+        found: dict[Way, float] = {}
+        for way in WAYS[: 1 + self.can_use_card]:
+            for _ in range(2):  # the first run compiles and uploads
+                self.context.finish()
+                start = time.perf_counter()
+                self._run(way, programs, weights, rest, positions, out)
+                self.context.finish()
+                found[way] = time.perf_counter() - start
+        return found
 
-    def seconds(self, run: Callable[[], None]) -> float:
-        """Return the time that work takes after a first run, which compiles and uploads."""
-        for _ in range(2):
-            self.context.finish()
-            start = time.perf_counter()
-            run()
-            self.context.finish()
-        return time.perf_counter() - start
+    def _run(
+        self,
+        way: Way,
+        programs: Programs,
+        weights: Floats,
+        rest: _Rows,
+        positions: moderngl.Buffer,
+        out: moderngl.Buffer,
+    ) -> None:
+        if way == "card":
+            self._on_card(programs, weights, positions, out)
+        else:
+            self._on_processor(weights, rest, out)
 
     @property
     def can_use_card(self) -> bool:
