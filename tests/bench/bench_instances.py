@@ -91,6 +91,7 @@ def draws(figure: Figure, samples: int, rounds: int) -> None:
         programs, rng = offscreen.renderer.programs, np.random.default_rng(1)
         instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
         target.framebuffer.use()
+        instances.vertices.reserve(COUNT)
         instances.update(scene.actors, Skinning())
         still = still_draw(offscreen.context, instances, view, options)
 
@@ -198,6 +199,7 @@ def processor(count: int, rounds: int) -> None:
     with Offscreen() as offscreen, offscreen.context:
         offscreen.target((16, 16), 1).framebuffer.use()
         instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
+        instances.vertices.reserve(count)
         instances.vertices._run = lambda *_: None  # leaves out the work of the driver
 
         def update(moves: bool) -> None:

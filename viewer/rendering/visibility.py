@@ -49,12 +49,14 @@ def prepare_meshes(
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
     of_figure: dict[int, list[list[Actor]]] = {}
+    size = 0
     for group in buffers.groups(actors, options):
         of_figure.setdefault(id(group[0].figure), []).append(group)
     for groups in of_figure.values():
         instanced = buffers.instanced(groups[0][0].figure, len(groups))
         for group, instances in zip(groups, instanced, strict=True):
-            instances.vertices.reserve(len(group))
+            size += len(group) * instances.vertices.size
+            instances.vertices.reserve(len(group), buffers.shared_after(size))
             meshes.instanced.append((group, instances))
     together = {id(actor) for group, _ in meshes.instanced for actor in group}
     for actor in actors:

@@ -17,10 +17,10 @@ def test_all_measurements_are_made(monkeypatch):
     found = [*measured()]
     assert all(one.milliseconds > 0.0 for one in found)
     assert [one.subject.partition(":")[0] for one in found].count("start to end") == 6
-    assert len(found) == 11
+    assert len(found) == 13
     compared = [one.to for one in found if one.to]
     still = ["a still body", "a still body", "2 still bodies"]
-    assert compared == ["import numpy", *3 * ["OpenGL context"], *still]
+    assert compared == ["import numpy", *3 * ["OpenGL context"], *still, "the processor"]
     assert len(commands) == 3 * 6  # a warm-up round and two measured rounds
 
 

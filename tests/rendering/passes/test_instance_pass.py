@@ -47,6 +47,7 @@ class Instances:
         """Return the output of the drawing pass's vertex shader, relative to the eye."""
         matrix = np.eye(4)
         matrix[:3, 3] = -np.asarray(eye)
+        self.instances.vertices.reserve(len(actors))
         self.instances.update(actors, how)
         program = self.programs.feedback("mesh", "", VARYINGS, ("INSTANCED",))
         self.instances.use(program, View(matrix, np.eye(4), Camera()))
@@ -270,7 +271,7 @@ def test_instances_of_a_removed_figure_are_freed(offscreen):
     offscreen.render(scene, (50, 50), camera, DisplayOptions(), box)
     instances = offscreen.renderer.buffers.instanced(scene.actors[0].figure, 1)[0]
     offscreen.render(rows_of_arms(2), (50, 50), camera, DisplayOptions(), box)
-    assert instances.vertices.posed is None
+    assert instances.vertices._own is None
     assert len(offscreen.renderer.buffers._instanced) == 0
 
 
@@ -283,6 +284,7 @@ def test_refused_upload_is_tried_again(ctx, monkeypatch):
 
     with monkeypatch.context() as patch, pytest.raises(RenderError):
         patch.setattr(posed_vertices, "write_stacked", refuse)
+        instances.instances.vertices.reserve(len(actors))
         instances.instances.update(actors, Skinning())
     check(instances, actors, Skinning())
     instances.release()
@@ -430,3 +432,36 @@ def test_crowd_far_from_the_origin_looks_as_near_it(offscreen):
     near, far = (picture.astype(int) for picture in pictures)
     # float64 itself resolves 1e-10 there; float32 would be off by 0.06.
     assert (np.abs(near - far).max(axis=-1) > 2).mean() < 0.002
+
+
+def test_posed_vertices_of_all_crowds_are_bounded(offscreen, work, monkeypatch):
+    scene, size = crowd(40), (64, 48)
+    camera, box, options = default_camera(scene, size), scene_box(scene), DisplayOptions()
+    whole = offscreen.render(scene, size, camera, options, box)
+    with offscreen.context:
+        offscreen.renderer.buffers.keep_only([])
+        mesh = offscreen.renderer.buffers.mesh(scene.actors[0].figure)
+    # Groups of a quarter of the bound, 8 actors, of which only four fit.
+    monkeypatch.setattr(actor_buffers, "MOST_POSED", 4 * 8 * BYTES_PER_VERTEX * mesh.n_vertices)
+    offscreen.renderer.notes.clear()
+    for _ in range(3):
+        work.clear()
+        bounded = offscreen.render(scene, size, camera, options, box)
+        np.testing.assert_array_equal(bounded, whole)
+        groups = offscreen.renderer.buffers.instanced(scene.actors[0].figure, 5)
+        assert [group.vertices.are_lost for group in groups] == 5 * [False]
+    assert work["transform"] == 0  # the only group that shares the buffer still holds it
+    # With two such groups, each draw skins one again.
+    more = crowd(48)
+    camera, box = default_camera(more, size), scene_box(more)
+    first = offscreen.render(more, size, camera, options, box)
+    work.clear()
+    assert (offscreen.render(more, size, camera, options, box) == first).all()
+    assert work["transform"] == 16
+    (note,) = offscreen.renderer.notes
+    assert note.startswith("posed vertices of this crowd need more than 0 MiB")
+    offscreen.renderer.notes.clear()
+    monkeypatch.undo()
+    with offscreen.context:
+        offscreen.renderer.buffers.keep_only([])
+    assert (offscreen.render(more, size, camera, options, box) == first).all()

@@ -121,6 +121,7 @@ def test_buffers_distinguish_scaled_instances_from_rigid_ones(ctx, how):
         actor.pose.scales[1] = scales
     programs, buffers = Programs(ctx), MeshBuffers(ctx, figure, [])
     instances = InstanceBuffers(ctx, programs, buffers)
+    instances.vertices.reserve(len(actors))
     instances.update(actors, how)
     program = programs.feedback("mesh", "", ("v_normal",), ("INSTANCED",))
     instances.use(program, View(np.eye(4), np.eye(4), Camera()))

@@ -11,7 +11,7 @@ import moderngl
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
-from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX
+from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX, SharedVertices
 from viewer.rendering.gpu.program import STORAGE_VERSION, Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.keypoint_pass import KeypointBuffers
     from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
     from viewer.rendering.passes.point_pass import PointBuffers
+
+
+MOST_POSED = 1 << 30
+"""Maximum size of the posed vertices of all crowds, bytes."""
 
 
 class _InstancedShapes:
@@ -52,6 +56,7 @@ class ActorBuffers:
         self._forget = forget
         self.meshes: Kept[Figure, MeshBuffers] = Kept()
         self._state: tuple[Sequence[Actor], list[Figure], int] = [], [], 0
+        self._shared = SharedVertices(context)
         self._instanced: Kept[Figure, _InstancedShapes] = Kept()
         self.posed: Kept[Actor, PosedMesh] = Kept()
         self.skeletons: Kept[Actor, SkeletonBuffers] = Kept()
@@ -114,7 +119,7 @@ class ActorBuffers:
         """Return the actors that are drawn together, as many as a storage buffer has room for."""
         if self.context.version_code < STORAGE_VERSION:
             return []
-        limit: int = self.context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
+        limit = min(self.context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"], MOST_POSED // 4)
         found: list[list[Actor]] = []
         for group in instance_groups(actors, options):
             size = BYTES_PER_VERTEX * self.mesh(group[0].figure).n_vertices
@@ -122,6 +127,18 @@ class ActorBuffers:
             if most >= FEWEST:
                 found += (group[start : start + most] for start in range(0, len(group), most))
         return found
+
+    def shared_after(self, size: int) -> SharedVertices | None:
+        """Return the buffer of groups with which posed vertices exceed their bound, or None."""
+        if size <= MOST_POSED:
+            return None
+        note = (
+            f"posed vertices of this crowd need more than {MOST_POSED >> 20} MiB: the others are "
+            "skinned again for every pass"
+        )
+        if note not in self._notes:
+            self._notes.append(note)
+        return self._shared
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -137,6 +154,7 @@ class ActorBuffers:
         figures = [actor.figure for actor in actors]
         if (actors, figures, self._n_kept()) == self._state:
             return  # nothing was made since, and a thousand actors need not be looked up
+        self._shared.release()
         self.posed.keep_only(actors, self._forget)
         for kept in (self.skeletons, self.keypoints, self.points, self.motion_paths):
             kept.keep_only(actors)

@@ -47,7 +47,6 @@ class PosedMesh:
     @property
     def posed(self) -> moderngl.Buffer:
         """The posed vertices: a row for every split vertex."""
-        assert self._vertices.posed is not None  # reserved from the start
         return self._vertices.posed
 
     @property

@@ -70,7 +70,8 @@ class PosedVertices:
         skin = mesh.figure.skin
         self._n_joints = skin.n_joints if skin else 0
         self.size = BYTES_PER_VERTEX * mesh.n_vertices
-        self.posed: moderngl.Buffer | None = None
+        self._own: moderngl.Buffer | None = None
+        self._shared: SharedVertices | None = None
         self.centers: Floats = np.zeros((0, 3))
         self.n_skinned = 0
         self._textures: dict[str, moderngl.Texture] = {}
@@ -79,21 +80,38 @@ class PosedVertices:
         self._rest = RestBuffers(context, programs, mesh)
         self._arrays = VertexArrays(context)
 
-    def reserve(self, count: int) -> None:
-        """Make room for actors; if there was none, the vertices of all of them are lost."""
-        if self.posed is not None and count <= len(self.centers):
+    def reserve(self, count: int, shared: SharedVertices | None = None) -> None:
+        """Make room for actors, in a shared buffer if given; it may lose the vertices of all."""
+        if shared is not None:
+            shared.reserve(count * self.size)
+        if (self._shared, self._has_room(count)) == (shared, True):
             return
         room = max(count, len(self.centers) * 3 // 2)  # adding actors rarely reallocates
-        if self.posed is not None:
-            self.posed.release()
-        self.posed, self.centers = None, np.zeros((0, 3))
-        what = f"posed vertices of {room * self.size / 1e6:.1f} MB"
-        self.posed = checked(self.context, self.context.buffer(reserve=room * self.size), what)
+        self._free_own()
+        self._shared, self.centers = shared, np.zeros((0, 3))
+        if shared is None:
+            what = f"posed vertices of {room * self.size / 1e6:.1f} MB"
+            self._own = checked(self.context, self.context.buffer(reserve=room * self.size), what)
         self.centers = np.tile(self.mesh.center, (room, 1))
         self._free_textures()
         self._room = min(room, self._together)
         for name in ("u_palette", "u_places"):
             self._texture(name)
+
+    def _has_room(self, count: int) -> bool:
+        return count <= len(self.centers) and (self._own is None) == (self._shared is not None)
+
+    @property
+    def posed(self) -> moderngl.Buffer:
+        """The posed vertices; room was reserved for them."""
+        buffer = self._own if self._shared is None else self._shared.buffer
+        assert buffer is not None  # reserved
+        return buffer
+
+    @property
+    def are_lost(self) -> bool:
+        """Whether other actors were skinned into the shared buffer since."""
+        return self._shared is not None and self._shared.holder is not self
 
     def skin(
         self,
@@ -168,7 +186,6 @@ class PosedVertices:
     ) -> None:
         """Skin actors whose data are uploaded, those with consecutive rows at once."""
         rest, skin = self._rest, self.mesh.skin(how)
-        assert self.posed is not None  # ``reserve`` was called
         # Rigid joints, by far the most common, use a cheaper program without scale and shear.
         macros = (("AFFINE_PALETTE", affine), ("REST_ROWS", attached and rest.has_rows))
         used = tuple(macro for macro, is_used in macros if is_used)
@@ -198,6 +215,8 @@ class PosedVertices:
                 buffer_offset=int(rows[first]) * self.size,
             )
         self.n_skinned += len(rows)
+        if self._shared is not None:
+            self._shared.holder = self
 
     def _free_textures(self) -> None:
         for texture in self._textures.values():
@@ -209,9 +228,34 @@ class PosedVertices:
         self._arrays.release()
         self._rest.release()
         self._free_textures()
-        if self.posed is not None:
-            self.posed.release()
-        self.posed = None
+        self._free_own()
+
+    def _free_own(self) -> None:
+        if self._own is not None:
+            self._own.release()
+        self._own = None
+
+
+class SharedVertices:
+    """A buffer for groups of actors that are skinned anew for each draw, to save memory."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self.buffer: moderngl.Buffer | None = None
+        self.holder: PosedVertices | None = None
+
+    def reserve(self, size: int) -> None:
+        """Make room for the vertices of one group, in bytes."""
+        if self.buffer is None or self.buffer.size < size:
+            self.release()
+            what = f"posed vertices of {size / 1e6:.1f} MB"
+            self.buffer = checked(self.context, self.context.buffer(reserve=size), what)
+
+    def release(self) -> None:
+        """Free the buffer."""
+        if self.buffer is not None:
+            self.buffer.release()
+        self.buffer = self.holder = None
 
 
 def skinning_options_key(how: Skinning) -> tuple[object, ...]:

@@ -188,6 +188,8 @@ class InstanceBuffers:
         self.vertices = PosedVertices(context, programs, mesh)
         self._table = PoseTable()
         self._key: tuple[object, ...] = ()
+        self._poses: Sequence[Pose] = ()
+        self._how = Skinning()
         self._figure = mesh.figure
         self._spheres: Floats = np.zeros((0, 0, 4))
         self._has_one_side: Bools = np.zeros(0, dtype=np.bool_)
@@ -202,18 +204,18 @@ class InstanceBuffers:
         poses = [actor.require_pose() for actor in actors]
         changed = self._table.update(poses)
         key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
-        self.count = len(poses)
-        self.vertices.reserve(self.count)
+        self.count, self._poses, self._how = len(poses), poses, how
         if key != self._key:
             changed[:] = True
         if changed.any():
             self._key = ()  # after an error, all actors are skinned again
-            self._skin(poses, np.flatnonzero(changed), how)
+            self._skin(np.flatnonzero(changed | self.vertices.are_lost))
             self.n_updates += 1
             self._key = key
         self._place(actors, poses)
 
-    def _skin(self, poses: Sequence[Pose], rows: NDArray[np.intp], how: Skinning) -> None:
+    def _skin(self, rows: NDArray[np.intp]) -> None:
+        poses, how = self._poses, self._how
         assert self._table.arrays is not None  # just updated
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         skeleton, skin = figure.require_skeleton(), figure.require_skin()
@@ -295,7 +297,8 @@ class InstanceBuffers:
             "u_eye_rest": tuple(rest.tolist()),
         }
         set_uniforms(program, values)
-        assert self.vertices.posed is not None  # guaranteed by update
+        if self.vertices.are_lost:
+            self._skin(np.arange(self.count))
         self.vertices.posed.bind_to_storage_buffer(POSED_BINDING)
 
     def array(
