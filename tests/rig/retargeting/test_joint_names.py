@@ -172,3 +172,16 @@ def test_map_that_leaves_all_joints_at_rest_is_refused():
     with pytest.raises(RigError) as caught:
         retarget(MOTION, BODY_FIGURE, JointMap(pairs))
     assert caught.value.diagnostic.key == "F004.joints-unmatched"
+
+
+def test_hips_beside_the_legs_are_the_spine_of_the_joint_above_both():
+    # A rig with controls: feet are joints of the root, and legs are not below the hips.
+    names = ["Root", "Foot.L", "Body", "Hips", "Abdomen", "Torso", "UpperLeg.L", "LowerLeg.L",
+             "UpperLeg.R", "LowerLeg.R", "Foot.R"]  # fmt: skip
+    parents = np.array([-1, 0, 0, 2, 3, 4, 2, 6, 2, 8, 0])
+    found = dict(zip(names, canonical_names(names, parents), strict=True))
+    assert found["Body"] == "pelvis"
+    assert [found[name] for name in names[3:6]] == ["spine1", "spine2", "spine3"]
+    # Legs below the root leave the hips what they are.
+    parents[[6, 8]] = 0
+    assert dict(zip(names, canonical_names(names, parents), strict=True))["Hips"] == "pelvis"

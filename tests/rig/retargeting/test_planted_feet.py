@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rig.retargeting.rest_twins import NAMES, PERSON, X, Y, along_x, t_pose, written
 from rig.retargeting.two_people import figure_of, places
@@ -11,12 +12,13 @@ from rig.retargeting.walking import N_WALK, RATE, stands, walk
 from viewer.rig.arrays import Floats
 from viewer.rig.feet.contacts import FootPath, foot_contacts
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.driven_feet import plant_feet
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.shape import rest_joints
 
@@ -303,3 +305,60 @@ def test_swinging_feet_do_not_sink_into_the_ground():
     before, after = places(OTHER, found.clip), places(OTHER, clip)
     assert min(before[name][:, 1].min() for name in TOES) < -2.0
     assert min(after[name][:, 1].min() for name in TOES) > -0.3
+
+
+def detached(figure: Figure, is_turned: bool) -> Figure:
+    """Return a person as animators' controls leave it: feet, listed first, are joints of a root.
+
+    ``is_turned``: the root has other axes than the world.
+    """
+    skeleton = figure.skeleton
+    world = dict(zip(skeleton.names, rest_joints(figure), strict=True))
+    above = dict(zip(skeleton.names, parents(figure), strict=True))
+    feet = ("LeftFoot_", "RightFoot_")
+    table = {"Root": ("", np.array([0.0, 0.0, -5.0]))}
+    table |= {name: ("Root", world[name]) for name in feet}
+    rest = [name for name in skeleton.names if name not in feet]
+    table |= {name: (above[name] or "Root", world[name]) for name in rest}
+    found = figure_of(table, "detached")
+    if not is_turned:
+        return found
+    axes = axis_rotations(1, np.asarray(0.7))
+    # World rotations R = A at the root: its children's offsets become A^T offset, and their own
+    # rest rotations A^T, so that all joints stay where they are.
+    skeleton = found.skeleton
+    below = np.flatnonzero(skeleton.parents == 0)
+    offsets, rotations = skeleton.rest_translations.copy(), skeleton.rest_rotations.copy()
+    offsets[below] = offsets[below] @ axes
+    rotations[0], rotations[below] = matrix_to_quaternion(axes), matrix_to_quaternion(axes.T)
+    return replace(
+        found, skeleton=replace(skeleton, rest_translations=offsets, rest_rotations=rotations)
+    )
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize("plants", [False, True])
+def test_feet_that_are_joints_of_the_root_follow_their_legs(plants, is_turned):
+    # The same person with feet below the shins has the same world positions in every frame.
+    motion = written(t_pose(), *walk(), rate=RATE)
+    drive = Drive(motion, "auto", plants_feet=plants)
+    apart = detached(OTHER, is_turned)
+    whole, _ = driven_clip(drive, OTHER)
+    clip, notes = driven_clip(drive, apart)
+    wanted, found = places(OTHER, whole), places(apart, clip)
+    for name, path in wanted.items():
+        assert_allclose(found[name], path, atol=1e-6)  # cm
+    assert any(note.key == "F007.feet-planted" for note in notes) == plants
+
+
+def test_joint_maps_reach_joints_with_shared_names_of_detached_feet():
+    figure = detached(OTHER, False)
+    names = tuple("Nub" if name.endswith("Hand_") else name for name in figure.skeleton.names)
+    figure = replace(figure, skeleton=replace(figure.skeleton, names=names))
+    motion = written(t_pose(), *walk(), rate=RATE)
+    nubs = [joint for joint, name in enumerate(names) if name == "Nub"]
+    chosen = JointMap(((f"Nub#{nubs[0]}", "RightLeg"),))
+    clip, _ = driven_clip(Drive(motion, "auto", chosen, plants_feet=False), figure)
+    plain, _ = driven_clip(Drive(motion, "auto", plants_feet=False), figure)
+    moved = np.abs(clip.rotations - plain.rotations).max(axis=(0, 2)) > 1e-6
+    assert moved[nubs].tolist() == [True, False]

@@ -17,6 +17,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
+from viewer.rig.retargeting.limb_hierarchy import limb_figure
 from viewer.rig.retargeting.rest_alignment import rest_of
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
@@ -29,11 +30,16 @@ _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
-    found = retarget(drive.motion, figure, drive.joint_map, drive.source_rest)
+    limbs = limb_figure(figure)
+    body = figure if limbs is None else limbs.figure
+    chosen = drive.joint_map if limbs is None else limbs.renamed(drive.joint_map, figure)
+    found = retarget(drive.motion, body, chosen, drive.source_rest)
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
-        clip, changes = plant_feet(found, figure, drive.hangs)
-        notes = notes + feet_notes(changes, found, figure)
+        clip, changes = plant_feet(found, body, drive.hangs)
+        notes = notes + feet_notes(changes, found, body)
+    if limbs is not None:
+        clip = limbs.original_clip(clip, figure)
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
         return clip, notes

@@ -191,11 +191,19 @@ def _canonical_names(names: tuple[str, ...], links: tuple[int, ...]) -> tuple[st
     chains = {chain: [j for j, role in enumerate(roles) if role == chain] for chain in _CHAINS}
     result = ["" if role in _CHAINS else role for role in roles]
     spine = chains["spine"]
+    legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
+    paths = [path_to_root(parents, joint)[1:] for joint in legs]
+    shared = [joint for path in paths[:1] for joint in path if all(joint in p for p in paths)]
+    if len(legs) == 2 and shared and "pelvis" in result:
+        # A joint called hips beside the legs is the first one of the spine, if the joint above both
+        # has no other meaning.
+        named = result.index("pelvis")
+        is_above = shared[0] in path_to_root(parents, named)[1:]
+        if is_above and not result[shared[0]] and parents[shared[0]] >= 0:
+            result[named], result[shared[0]] = "", "pelvis"
+            spine = sorted([named, *spine])
     if "pelvis" not in result:
         # The pelvis is the joint above both legs; otherwise, above the first leg or spine.
-        legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
-        paths = [path_to_root(parents, joint)[1:] for joint in legs]
-        shared = [joint for path in paths[:1] for joint in path if all(joint in p for p in paths)]
         if not shared and spine:
             shared = path_to_root(parents, spine[0])[1:]
         if shared and not result[shared[0]]:
