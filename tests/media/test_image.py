@@ -3,6 +3,7 @@
 import io
 import sys
 import threading
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -111,6 +112,26 @@ def test_png_contains_every_pixel_with_alpha(size):
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         assert picture.mode == "RGBA" or (pixels[..., 3] == 255).all()
         np.testing.assert_array_equal(np.array(picture.convert("RGBA")), pixels)
+
+
+@pytest.mark.parametrize("is_opaque", [True, False])
+def test_png_of_several_bands_contains_every_pixel(is_opaque, monkeypatch):
+    monkeypatch.setattr("viewer.media.png._BAND", 90)  # three rows of thirty pixels
+    pixels = noise(10, 30, seed=5)
+    pixels[..., 3] |= 255 * is_opaque
+    with Image.open(io.BytesIO(encode_png(pixels))) as picture:
+        np.testing.assert_array_equal(np.array(picture.convert("RGBA")), pixels)
+
+
+def test_png_needs_no_copy_of_the_image():
+    pixels = np.zeros((2000, 1000, 4), dtype=np.uint8)
+    tracemalloc.start()
+    try:
+        encode_png(pixels)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < pixels.nbytes / 4
 
 
 @pytest.mark.parametrize("size", [(1, 1), (33, 20)])
