@@ -1,17 +1,23 @@
-"""Recording of a video, compared with only drawing and only encoding its frames. Drawing uses the
-recorder with a sink that drops the frames; encoding uses the video sink with stored frames. The
-video has 1280 x 720 pixels, 4 samples per pixel, and H.264 at the default quality.
+"""Recording of a video and of numbered pictures, compared with only drawing and only encoding their
+frames. Drawing uses the recorder with a sink that drops the frames; encoding gives stored frames to
+as many threads as the sink allows. Frames have 1280 x 720 pixels and 4 samples per pixel, the video
+H.264 at the default quality. The goal is for graphics cards: in software, drawing and encoding
+share the processor, so the processor time of all threads per frame is printed too.
 """
 
+import os
 import statistics
 import tempfile
+import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from measure import interleaved
 
 import viewer
+from viewer.media.picture_sinks import PictureSink
 from viewer.media.video import VideoSink
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.offscreen import Offscreen, default_camera
@@ -22,7 +28,7 @@ from viewer.rig.scene import Actor, Scene
 
 SIZE = 1280, 720
 N_FRAMES, RATE = 60, 30.0
-GOAL = 0.8
+GOAL = 0.9
 
 
 class _Dropped:
@@ -73,8 +79,8 @@ def main(rounds: int = 5) -> None:
     scene = Scene([moving()])
     recording = Recording(scene, np.arange(N_FRAMES) / RATE, default_camera(scene, SIZE), SIZE)
     _, recording.box = frame_motion(recording)
-    with tempfile.TemporaryDirectory() as folder, Offscreen() as offscreen, offscreen.context:
-        path = Path(folder) / "x.mp4"
+    with tempfile.TemporaryDirectory() as name, Offscreen() as offscreen, offscreen.context:
+        folder = Path(name)
 
         def recorded(make: Callable[[], Sink]) -> Callable[[], object]:
             return lambda: list(record(recording, offscreen.renderer, make()))
@@ -82,25 +88,58 @@ def main(rounds: int = 5) -> None:
         kept = _Kept()
         recorded(lambda: kept)()
 
-        def encode() -> None:
-            sink = VideoSink(path, SIZE, RATE)
-            for frame, pixels in enumerate(kept.frames):
-                sink.write(frame, pixels)
-            sink.close()
+        def encoded(make: Callable[[], Sink]) -> Callable[[], object]:
+            def encode() -> None:
+                sink = make()
+                with ThreadPoolExecutor(sink.workers) as pool:
+                    list(pool.map(sink.write, range(N_FRAMES), kept.frames))
+                sink.close()
 
-        work = {
-            "drawing alone": recorded(_Dropped),
-            "encoding alone": encode,
-            "video": recorded(lambda: VideoSink(path, SIZE, RATE)),
-        }
-        times = interleaved(work, rounds)
-    print(f"{N_FRAMES} frames of {SIZE[0]} x {SIZE[1]}")
+            return encode
+
+        def video() -> Sink:
+            return VideoSink(folder / "x.mp4", SIZE, RATE)
+
+        def pictures() -> Sink:
+            return PictureSink([folder / f"{frame}.png" for frame in range(N_FRAMES)])
+
+        print(f"{N_FRAMES} frames of {SIZE[0]} x {SIZE[1]}, load {os.getloadavg()[0]:.1f}")
+        for kind, make in (("video", video), ("pictures", pictures)):
+            work = {
+                "drawing alone": recorded(_Dropped),
+                "encoding alone": encoded(make),
+                kind: recorded(make),
+            }
+            used: dict[str, list[float]] = {}
+            times = interleaved(
+                {key: with_work(key, run, used) for key, run in work.items()}, rounds
+            )
+            report(times, used, kind)
+
+
+def with_work(
+    name: str, run: Callable[[], object], used: dict[str, list[float]]
+) -> Callable[[], None]:
+    """Return a function that also appends the processor time of a run, in milliseconds."""
+
+    def measured() -> None:
+        before = time.process_time()
+        run()
+        used.setdefault(name, []).append(1e3 * (time.process_time() - before))
+
+    return measured
+
+
+def report(times: dict[str, list[float]], used: dict[str, list[float]], kind: str) -> None:
+    """Print rates, processor times, and the ratio with its goal."""
     for name, values in times.items():
-        print(f"  {name:<16} {N_FRAMES / (statistics.median(values) / 1e3):7.1f} frames/s")
-    alone = zip(times["drawing alone"], times["encoding alone"], times["video"], strict=True)
+        rate = N_FRAMES / (statistics.median(values) / 1e3)
+        each = statistics.median(used[name]) / N_FRAMES
+        print(f"  {name:<16} {rate:7.1f} frames/s, {each:6.1f} ms of processor time per frame")
+    alone = zip(times["drawing alone"], times["encoding alone"], times[kind], strict=True)
     ratio = statistics.median(max(draw, code) / both for draw, code, both in alone)
     verdict = "met" if ratio >= GOAL else "MISSED"
-    print(f"  speed of the video / of the slower one: {ratio:.2f} (goal: {GOAL:g}, {verdict})\n")
+    print(f"  speed of {kind} / of the slower one: {ratio:.2f} (goal: {GOAL:g}, {verdict})\n")
 
 
 if __name__ == "__main__":

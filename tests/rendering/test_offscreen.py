@@ -43,6 +43,18 @@ def test_rows_are_returned_from_the_top(scene):
     assert pixels[0, :, :3].mean() < pixels[-1, :, :3].mean()
 
 
+def test_rows_in_memory_begin_at_the_top(scene):
+    """Bands of 32 rows are exchanged."""
+    options = DisplayOptions(quality="draft")
+    with Offscreen() as offscreen:
+        for size in ((20, 1), (20, 64), (20, 131)):
+            pixels = viewer.render(scene, size, options=options)
+            assert pixels.flags.c_contiguous and pixels.flags.writeable
+            camera = default_camera(scene, size)
+            wanted = offscreen.render(scene, size, camera, options, scene_box(scene))
+            np.testing.assert_array_equal(pixels, wanted)
+
+
 def test_rendering_twice_returns_the_same_pixels(scene):
     np.testing.assert_array_equal(viewer.render(scene, (64, 48)), viewer.render(scene, (64, 48)))
 

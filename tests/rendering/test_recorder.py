@@ -2,7 +2,6 @@
 
 import threading
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,9 +11,11 @@ from rendering.moving import moving_arm
 from viewer.errors import OutputError, ViewerError
 from viewer.progress import receiving
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.target import Readback
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.recorder import Follow, Recording, Waiter, record
+from viewer.rendering.recorder import Follow, Recording, record
+from viewer.rendering.renderer import Renderer
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor, Scene, scene_box
 
@@ -285,10 +286,72 @@ def test_few_frames_are_queued_for_a_slow_sink(offscreen, scene):
     drawn = 0
     with offscreen.context:
         for drawn in record(recording, offscreen.renderer, sink):
-            if drawn == 3:  # one is being written and two are queued; the next must wait
+            if drawn == 2:  # one is being written and one is queued; the next must wait
                 threading.Timer(0.2, gate.set).start()
-            assert drawn - len(sink.frames) <= 4
+            assert drawn - len(sink.frames) <= 3
     assert drawn == 12 == len(sink.frames)
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_memory_holds_a_frame_per_worker_and_two_more(offscreen, scene, monkeypatch, workers):
+    """The sink waits until all that may be held is held, and gives time to exceed it."""
+    held, most, given, foreign, full = 0, 0, [], [], threading.Event()
+    begin, end, free = Readback.begin, Readback.end, Readback.free
+
+    def counted_begin(self):
+        nonlocal held, most
+        begin(self)
+        held += 1
+        most = max(most, held)
+        if held == workers + 2:
+            full.set()
+
+    def kept_end(self):
+        given.append(end(self))
+        return given[-1]
+
+    def counted_free(self):
+        nonlocal held
+        free(self)
+        held -= 1
+
+    class Slow(Kept):
+        def write(self, frame, pixels):
+            assert full.wait(10)
+            time.sleep(0.02)
+            if not np.shares_memory(pixels, given[frame]):
+                foreign.append(frame)
+            super().write(frame, pixels)
+
+    for name, function in (("begin", counted_begin), ("end", kept_end), ("free", counted_free)):
+        monkeypatch.setattr(Readback, name, function)
+    recording, sink = recording_of(scene), Slow(workers)
+    recording.times = np.linspace(0.0, 1.0, 12)
+    run(offscreen, recording, sink)
+    assert len(sink.frames) == 12 and most == workers + 2
+    assert not foreign  # the sink got the driver's memory, not a copy
+
+
+def test_next_frame_is_submitted_before_the_last_one_is_waited_for(offscreen, scene, monkeypatch):
+    events = []
+
+    def noted(kind, name):
+        function = getattr(kind, name)
+
+        def call(self, *arguments):
+            events.append(name)
+            return function(self, *arguments)
+
+        monkeypatch.setattr(kind, name, call)
+
+    for kind, name in ((Renderer, "draw"), (Readback, "submit"), (Readback, "end")):
+        noted(kind, name)
+    recording = recording_of(scene)
+    recording.times = TIMES[:3]
+    run(offscreen, recording, Kept())
+    # Each copy is submitted too, before the next frame is prepared.
+    first, between, last = "draw submit", "submit draw submit end", "submit end"
+    assert events == f"{first} {between} {between} {last}".split()
 
 
 def test_unsupported_size_is_refused(offscreen, scene):
@@ -297,71 +360,3 @@ def test_unsupported_size_is_refused(offscreen, scene):
     with pytest.raises(ViewerError, match="image size: expected 1 to"):
         run(offscreen, recording, sink)
     assert sink.ended == ["abort"]
-
-
-SLOW = """
-#version 330
-out vec4 f_color;
-uniform int u_steps;
-void main() {
-    float sum = gl_FragCoord.x;
-    for (int i = 0; i < u_steps; i++) sum = sin(sum + 0.1);
-    f_color = vec4(sum);
-}
-"""
-CORNERS = """
-#version 330
-in vec2 in_corner;
-void main() { gl_Position = vec4(in_corner, 0.0, 1.0); }
-"""
-
-
-def test_other_threads_run_while_waiting_for_the_driver(ctx):
-    program = ctx.program(vertex_shader=CORNERS, fragment_shader=SLOW)
-    corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
-    buffer = ctx.buffer(corners.tobytes())
-    array = ctx.vertex_array(program, [(buffer, "2f", "in_corner")])
-    target = ctx.simple_framebuffer((256, 256))
-    target.use()
-    ctx.enable_only(ctx.NOTHING)  # other tests leave the depth test enabled
-    waiter, ticks, done = Waiter(ctx), [], threading.Event()
-
-    def tick() -> None:
-        while not done.is_set():
-            ticks.append(time.perf_counter())
-            time.sleep(0.001)
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    try:
-        took = inside = steps = 0
-        while took < 0.05:  # the work of the shader grows until it can be measured
-            steps = 4 * steps or 100
-            program["u_steps"] = steps
-            array.render()
-            waiter.begin()
-            started = time.perf_counter()
-            waiter.end()
-            ended = time.perf_counter()
-            took, inside = ended - started, sum(started < tick < ended for tick in ticks)
-    finally:
-        done.set()
-        thread.join()
-        for item in (target, array, buffer, program):
-            item.release()
-    assert waiter.is_free and inside >= 5
-
-
-def test_waiting_works_without_exposed_functions():
-    calls = []
-    context = SimpleNamespace(mglo=object(), finish=lambda: calls.append("finish"))
-    waiter = Waiter(context)
-    waiter.begin()
-    waiter.end()
-    assert not waiter.is_free and calls == ["finish"]
-
-
-def test_loader_without_the_function_is_not_used():
-    loader = SimpleNamespace(load_opengl_function=lambda name: 0)
-    context = SimpleNamespace(mglo=SimpleNamespace(_context=loader), finish=lambda: None)
-    assert not Waiter(context).is_free

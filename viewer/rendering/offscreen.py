@@ -21,6 +21,7 @@ from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, Shown, scene_points
 
 _thread = threading.local()
+_BAND = 32  # number of rows that are exchanged at once, so that they stay in the processor's cache
 
 
 class Offscreen:
@@ -67,7 +68,7 @@ class Offscreen:
         box: Floats,
         on_time: Callable[[float, int], object] | None = None,
     ) -> Bytes:
-        """Draw a scene and return its pixels; see ``render``."""
+        """Draw a scene and return its pixels; see ``render``. The last row is first in memory."""
         # The second of several passes is timed, because the first one also compiles shaders and
         # uploads buffers: ``on_time`` is called with its seconds and the number of passes.
         with self.context:
@@ -175,4 +176,18 @@ def render(
     points = scene_points(scene, options.show)
     camera = camera or _framing(scene, size, points)
     with deferred():
-        return offscreen.render(scene, size, camera, options, bounding_box(points))
+        pixels = offscreen.render(scene, size, camera, options, bounding_box(points))
+    return _contiguous(pixels)
+
+
+def _contiguous(pixels: Bytes) -> Bytes:
+    """Put the first row first in memory, in place; other libraries need that."""
+    rows = pixels[::-1]  # as they are in memory
+    height = len(rows)
+    for top in range(0, height // 2, _BAND):
+        bottom = min(top + _BAND, height // 2)
+        low, high = rows[top:bottom], rows[height - bottom : height - top]
+        kept = low[::-1].copy()
+        low[:] = high[::-1]
+        high[:] = kept
+    return rows

@@ -1,9 +1,11 @@
 """Recording of frames: drawing, reading back and encoding run in parallel.
 
-While the driver draws a frame, this thread poses the next one and the sink's workers encode
-previous ones. This thread releases the global interpreter lock while it waits for the driver, so
-recording takes about as long as the slower of drawing and encoding, unless both compete for the
-same CPU cores (``tests/bench/bench_video.py``).
+While the driver draws a frame, this thread poses the next one, gives it to the driver as well, and
+only then waits for the first; meanwhile the sink's workers encode earlier frames. Waiting does not
+hold the global interpreter lock (``Readback``), so recording takes about as long as the slower of
+drawing and encoding, unless both compete for the same CPU cores (``tests/bench/bench_video.py``).
+Frames are in the driver's memory until they are encoded: one that is drawn, one for each worker,
+and one that waits for a worker.
 
 The window and the command line both use it::
 
@@ -15,8 +17,6 @@ The window and the command line both use it::
 
 from __future__ import annotations
 
-import ctypes
-import math
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -24,14 +24,12 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Protocol
 
-import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rendering.camera import Camera, follow_view
-from viewer.rendering.gpu.target import Target, picture_rows, straight
-from viewer.rendering.gpu.upload import checked
+from viewer.rendering.gpu.target import Readback, Target, make_straight
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
@@ -40,7 +38,7 @@ from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Scene, scene_box
 
-_WAITING = 2  # number of frames that may wait for a worker, limited to save memory
+_WAITING = 1  # number of frames that may wait for a worker, limited to save memory
 _PATIENCE = 0.05  # seconds between steps while the sink finishes
 
 
@@ -117,12 +115,16 @@ class Sink(Protocol):
         """Number of frames, spread over the recording, to pass to ``look`` first."""
 
     def look(self, pixels: Bytes) -> None:
-        """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
+        """Inspect a sample frame before any frame is written, to choose the palette of a GIF.
+
+        ``pixels``: as in ``write``.
+        """
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Write a frame, counted from 0, in a worker thread.
 
-        ``pixels``: (H, W, 4) uint8, sRGB with straight alpha, first row at the top; read-only.
+        ``pixels``: (H, W, 4) uint8, sRGB with straight alpha, first row at the top; read-only, and
+        in memory that is reused afterwards.
         """
 
     def close(self) -> None:
@@ -145,26 +147,31 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[in
     queue = _Queue(max(sink.workers, 1))
     is_opaque = recording.options.background != "transparent"
 
-    def pixels_of(data: bytes) -> Bytes:
-        pixels = picture_rows(data, recording.size)
-        return pixels if is_opaque else straight(pixels)
+    def finished(pixels: Bytes) -> Bytes:
+        if is_opaque:
+            return pixels
+        pixels = pixels.copy()
+        make_straight(pixels)
+        return pixels
 
-    def look(data: bytes) -> None:
-        sink.look(pixels_of(data))
+    def look(pixels: Bytes) -> None:
+        sink.look(finished(pixels))
 
-    def write(frame: int, data: bytes) -> None:
-        sink.write(frame, pixels_of(data))
+    def write(frame: int, pixels: Bytes) -> None:
+        sink.write(frame, finished(pixels))
 
     drawer: _Drawer | None = None
     try:
-        drawer = _Drawer(recording, renderer)
-        for data in drawer.draw(samples):
+        drawer = _Drawer(recording, renderer, queue.most + 1)
+        for pixels in drawer.draw(samples):
             # Sample frames are inspected one at a time, in order.
-            queue.begin(partial(look, data)).result()
+            queue.begin(partial(look, pixels)).result()
+            drawer.readback.free()
             report(0, total, "frames")
             yield 0
-        for frame, data in enumerate(drawer.draw(range(total))):
-            queue.add(partial(write, frame, data))
+        for frame, pixels in enumerate(drawer.draw(range(total))):
+            for _ in range(queue.add(partial(write, frame, pixels))):
+                drawer.readback.free()
             report(frame + 1, total, "frames")
             yield frame + 1
         queue.finish()
@@ -199,17 +206,21 @@ class _Queue:
 
     def __init__(self, workers: int) -> None:
         self._pool = ThreadPoolExecutor(workers, "viewer-record")
-        self._most = workers + _WAITING
+        self.most = workers + _WAITING
         self._waiting: deque[Future[None]] = deque()
 
     def begin(self, work: Callable[[], None]) -> Future[None]:
         return self._pool.submit(work)
 
-    def add(self, work: Callable[[], None]) -> None:
-        """Submit work; if too much is queued, wait for the oldest and raise its exception."""
+    def add(self, work: Callable[[], None]) -> int:
+        """Submit work; return how many of the oldest works are done, and raise their exception."""
+        # If too much is queued, this waits for the oldest.
         self._waiting.append(self.begin(work))
-        while len(self._waiting) > self._most:
+        n_done = 0
+        while self._waiting and (len(self._waiting) > self.most or self._waiting[0].done()):
             self._waiting.popleft().result()
+            n_done += 1
+        return n_done
 
     def finish(self) -> None:
         while self._waiting:
@@ -222,48 +233,43 @@ class _Queue:
 class _Drawer:
     """Drawer of a recording's frames; each is drawn while the previous one is passed on."""
 
-    def __init__(self, recording: Recording, renderer: Renderer) -> None:
+    def __init__(self, recording: Recording, renderer: Renderer, n_buffers: int) -> None:
         self._recording, self._renderer = recording, renderer
-        self._scene, context = copied(recording.scene), renderer.context
+        self._scene = copied(recording.scene)
         show = recording.options.show
         self._box = scene_box(self._scene, show) if recording.box is None else recording.box
-        self._waiter = Waiter(context)
-        self._target = Target(context, recording.size, recording.options.samples)
+        self._target = Target(renderer.context, recording.size, recording.options.samples)
         try:
-            n_bytes = 4 * math.prod(recording.size)
-            what = f"a buffer of {n_bytes / 1e6:.1f} MB for frames"
-            self._buffer = checked(context, context.buffer(reserve=n_bytes), what)
+            self.readback = Readback(self._target, n_buffers)
         except BaseException:
             self._release_target()
             raise
 
-    def draw(self, frames: Sequence[int]) -> Generator[bytes]:
-        """Yield the bytes of frames in OpenGL's order, last row first."""
+    def draw(self, frames: Sequence[int]) -> Generator[Bytes]:
+        """Yield the pixels of frames, with premultiplied alpha; free each one afterwards."""
         cameras, times = _Cameras(self._recording), self._recording.times
         for step in range(len(frames) + 1 if frames else 0):
             if step < len(frames):
                 # The driver is still drawing the previous frame.
                 pose_scene(self._scene, self._recording, float(times[frames[step]]))
             if step:
-                self._waiter.end()
-                self._target.resolve()
-                self._target.read_into(self._buffer)
+                self.readback.begin()
             if step < len(frames):
                 self._draw(cameras.at(frames[step], self._scene))
             if step:
-                yield self._buffer.read()
+                yield self.readback.end()
 
     def _draw(self, camera: Camera) -> None:
         recording, scene, target = self._recording, self._scene, self._target
         if recording.annotations is not None:
             self._renderer.annotations = recording.annotations(scene, recording.size)
         self._renderer.draw(scene, camera, recording.options, target, self._box, recording.selected)
-        self._waiter.begin()
+        self.readback.submit()
 
     def release(self) -> None:
-        """Free target and buffer, and leave the default framebuffer bound."""
+        """Free target and buffers, and leave the default framebuffer bound."""
         self._release_target()
-        self._buffer.release()
+        self.readback.release()
 
     def _release_target(self) -> None:
         # Unbind the target before freeing it, since moderngl would bind it again.
@@ -292,35 +298,3 @@ class _Cameras:
         elif recording.shifts is not None:
             camera.target = camera.target + recording.shifts[frame]
         return camera
-
-
-class Waiter:
-    """Submission of work to the driver, and waiting without holding Python's lock.
-
-    moderngl holds the global interpreter lock during every call. Reading an image that is still
-    being drawn blocks until the drawing is finished, and meanwhile no other thread can run Python:
-    an encoder thread that needs the lock five times per frame would be delayed by five frames.
-    ``ctypes`` releases the lock during a call, so two OpenGL functions are called through it, if
-    ``is_free``: some versions of moderngl do not expose the functions' addresses.
-    """
-
-    def __init__(self, context: moderngl.Context) -> None:
-        flush, finish = _gl_function(context, "glFlush"), _gl_function(context, "glFinish")
-        self.is_free = finish is not None
-        self._flush: Callable[[], None] = flush or (lambda: None)
-        self._finish: Callable[[], None] = finish or context.finish
-
-    def begin(self) -> None:
-        """Submit all queued work to the driver without waiting."""
-        self._flush()
-
-    def end(self) -> None:
-        """Wait until the driver has finished all queued work."""
-        self._finish()
-
-
-def _gl_function(context: moderngl.Context, name: str) -> Callable[[], None] | None:
-    """Return an OpenGL function without arguments; None if its address is unknown."""
-    loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
-    address = loader(name) if loader is not None else 0
-    return ctypes.CFUNCTYPE(None)(address) if address else None

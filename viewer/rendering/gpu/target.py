@@ -1,11 +1,16 @@
 """Render targets: a multisampled framebuffer, resolved to a single-sample framebuffer.
 
-The passes of an image in final quality are summed in floating point and averaged.
+The passes of an image in final quality are summed in floating point and averaged. A single image is
+read directly into an array; those of a recording are copied to buffers while the next is drawn.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import moderngl
 import numpy as np
@@ -19,6 +24,23 @@ from viewer.rendering.gpu.upload import checked
 from viewer.rig.arrays import Bytes
 
 _OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian number
+
+_Call: TypeAlias = Callable[..., int | None]
+_UINT, _INT, _SIZE, _POINTER = ctypes.c_uint, ctypes.c_int, ctypes.c_ssize_t, ctypes.c_void_p
+_SIGNATURES: dict[str, tuple[type | None, list[type]]] = {
+    "glBindBuffer": (None, [_UINT, _UINT]),
+    "glBindFramebuffer": (None, [_UINT, _UINT]),
+    "glBlitFramebuffer": (None, [*[_INT] * 8, _UINT, _UINT]),
+    "glBufferData": (None, [_UINT, _SIZE, _POINTER, _UINT]),
+    "glFlush": (None, []),
+    "glMapBufferRange": (_POINTER, [_UINT, _SIZE, _SIZE, _UINT]),
+    "glReadPixels": (None, [*[_INT] * 4, _UINT, _UINT, _POINTER]),
+    "glUnmapBuffer": (ctypes.c_ubyte, [_UINT]),
+}
+"""Result and arguments of OpenGL's functions."""
+_PIXEL_PACK_BUFFER, _READ_FRAMEBUFFER = 0x88EB, 0x8CA8
+_STREAM_READ, _MAP_READ_BIT = 0x88E1, 0x0001
+_COLOR_BUFFER_BIT, _NEAREST, _RGBA, _UNSIGNED_BYTE = 0x4000, 0x2600, 0x1908, 0x1401
 
 
 class Target:
@@ -49,8 +71,8 @@ class Target:
         own.append(self.texture)
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         if self.samples:
-            self._resolved = context.framebuffer([self.texture])
-            own.append(self._resolved)
+            self.resolved = context.framebuffer([self.texture])
+            own.append(self.resolved)
             color = context.renderbuffer(size, 4, samples=self.samples)
             own.append(color)
             depth = context.depth_renderbuffer(size, samples=self.samples)
@@ -59,7 +81,7 @@ class Target:
         else:
             depth = context.depth_renderbuffer(size)
             own.append(depth)
-            self.framebuffer = self._resolved = context.framebuffer([self.texture], depth)
+            self.framebuffer = self.resolved = context.framebuffer([self.texture], depth)
         own.append(self.framebuffer)
 
     def _no_room(self) -> RenderError:
@@ -80,23 +102,139 @@ class Target:
     def resolve(self) -> moderngl.Texture:
         """Average the samples and return the image's texture."""
         if self.samples:
-            self.context.copy_framebuffer(self._resolved, self.framebuffer)
+            self.context.copy_framebuffer(self.resolved, self.framebuffer)
         return self.texture
 
     def read(self) -> Bytes:
         """Return the resolved image: (H, W, 4) uint8 with straight alpha, first row at the top."""
-        return straight(picture_rows(self._resolved.read(components=4), self.size))
-
-    def read_into(self, buffer: moderngl.Buffer) -> None:
-        """Queue a copy of the resolved image to a buffer, without waiting for it."""
-        # The buffer has 4 bytes per pixel, last row first; ``picture_rows`` converts it to an
-        # image. Reading it waits for the copy.
-        self._resolved.read_into(buffer, components=4)
+        # Its memory has OpenGL's order of rows, because reversing them would be another pass.
+        pixels = np.empty((self.size[1], self.size[0], 4), dtype=np.uint8)
+        self.resolved.read_into(pixels, components=4)
+        make_straight(pixels)
+        return pixels[::-1]
 
     def release(self) -> None:
         """Free framebuffers and textures."""
         for item in self._owned:
             item.release()
+
+
+class Readback:
+    """Images of a target, copied to buffers that other threads read while the next one is drawn.
+
+    An image passes through ``begin``, ``end`` and ``free``, in this order and always the oldest
+    first; ``count`` of them may be between ``begin`` and ``free``. Drivers of graphics cards copy
+    an image after ``begin`` has returned. Others copy it at once, and finish drawing it first.
+
+    moderngl holds Python's lock during every call, so no other thread could run while the driver
+    waits or copies: an encoder that needs the lock five times per frame would be delayed by five
+    frames. ``ctypes`` releases the lock, so the functions that may wait are called through it, and
+    the pixels are those of the driver, without a copy. If moderngl does not expose the addresses of
+    OpenGL's functions, its own functions are called (``is_free`` is False).
+    """
+
+    def __init__(self, target: Target, count: int) -> None:
+        self._target, context = target, target.context
+        self._n_bytes = 4 * math.prod(target.size)
+        self._free, self._begun, self._ended = (deque[moderngl.Buffer]() for _ in range(3))
+        self._calls = _calls(context)
+        self.is_free = self._calls is not None
+        what = f"a buffer of {self._n_bytes / 1e6:.1f} MB for frames"
+        self._owner = Owner()
+        with self._owner.guard():
+            for _ in range(count):
+                made = checked(context, context.buffer(reserve=self._n_bytes), what)
+                self._free.append(self._owner.keep(made))
+                if self._calls is None:
+                    continue
+                # moderngl announces that buffers will be written by this process, so drivers place
+                # them where reading is slow.
+                self._bind(made)
+                self._calls["glBufferData"](_PIXEL_PACK_BUFFER, self._n_bytes, None, _STREAM_READ)
+                self._bind(None)
+                check_errors(context, what)
+
+    def begin(self) -> None:
+        """Queue a copy of the target's image, which may be drawn again afterwards."""
+        buffer = self._free.popleft()
+        self._begun.append(buffer)
+        target, calls = self._target, self._calls
+        if calls is None:
+            target.resolve()
+            target.resolved.read_into(buffer, components=4)
+            return
+        width, height = target.size
+        target.resolved.use()  # for reading and drawing
+        if target.samples:
+            box = 0, 0, width, height
+            calls["glBindFramebuffer"](_READ_FRAMEBUFFER, target.framebuffer.glo)
+            calls["glBlitFramebuffer"](*box, *box, _COLOR_BUFFER_BIT, _NEAREST)
+            calls["glBindFramebuffer"](_READ_FRAMEBUFFER, target.resolved.glo)
+        self._bind(buffer)
+        calls["glReadPixels"](0, 0, width, height, _RGBA, _UNSIGNED_BYTE, None)
+        self._bind(None)
+        self.submit()
+
+    def submit(self) -> None:
+        """Let the driver start all work that was queued, without waiting for it."""
+        if self._calls is not None:
+            self._calls["glFlush"]()
+
+    def end(self) -> Bytes:
+        """Wait for a copy, and return its pixels; they must not be used after ``free``.
+
+        (H, W, 4) uint8, premultiplied, first row at the top; read-only.
+        """
+        buffer = self._begun.popleft()
+        self._ended.append(buffer)
+        if self._calls is None:
+            data = memoryview(buffer.read())
+        else:
+            # This waits for the commands that write the buffer, and not for later ones.
+            self._bind(buffer)
+            address = self._calls["glMapBufferRange"](
+                _PIXEL_PACK_BUFFER, 0, self._n_bytes, _MAP_READ_BIT
+            )
+            self._bind(None)
+            if not address:
+                doing = f"reading an image of {self._n_bytes / 1e6:.1f} MB"
+                check_errors(self._target.context, doing)
+                raise RenderError(f"{doing}: the driver provides no address")
+            data = memoryview((ctypes.c_ubyte * self._n_bytes).from_address(address))
+        pixels = picture_rows(data, self._target.size)
+        pixels.flags.writeable = False
+        return pixels
+
+    def free(self) -> None:
+        """Reuse the buffer of the oldest image that ``end`` returned."""
+        buffer = self._ended.popleft()
+        self._free.append(buffer)
+        if self._calls is not None:
+            self._bind(buffer)
+            is_intact = self._calls["glUnmapBuffer"](_PIXEL_PACK_BUFFER)
+            self._bind(None)
+            if not is_intact:
+                raise RenderError("the driver lost the pixels of an image while they were read")
+
+    def _bind(self, buffer: moderngl.Buffer | None) -> None:
+        assert self._calls is not None
+        self._calls["glBindBuffer"](_PIXEL_PACK_BUFFER, 0 if buffer is None else buffer.glo)
+
+    def release(self) -> None:
+        """Free the buffers; no other thread may read an image any more."""
+        self._owner.release()
+
+
+def _calls(context: moderngl.Context) -> dict[str, _Call] | None:
+    """Return OpenGL's functions by name; None if an address is unknown."""
+    loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
+    addresses = {name: loader(name) if loader is not None else 0 for name in _SIGNATURES}
+    if not all(addresses.values()):
+        return None
+    return {
+        name: ctypes.CFUNCTYPE(result, *arguments)(addresses[name])
+        for name, (result, arguments) in _SIGNATURES.items()
+    }
 
 
 class Accumulation:
@@ -169,22 +307,20 @@ def target_bytes(size: tuple[int, int], samples: int) -> int:
     return picture * (2 * samples + 1) if samples else 2 * picture
 
 
-def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
+def picture_rows(data: bytes | memoryview, size: tuple[int, int]) -> Bytes:
     """Return pixels from OpenGL as a view: (H, W, 4) uint8, first row at the top."""
     return np.frombuffer(data, dtype=np.uint8).reshape(size[1], size[0], 4)[::-1]
 
 
-def straight(pixels: Bytes) -> Bytes:
-    """Return colours with straight instead of premultiplied alpha: (H, W, 4), a copy."""
-    pixels = pixels.copy()
+def make_straight(pixels: Bytes) -> None:
+    """Replace premultiplied colours by straight ones, in place; (H, W, 4) uint8."""
     if pixels.size and pixels.view("<u4").min() >= _OPAQUE:
-        return pixels
+        return
     alpha = pixels[..., 3]
     partial = (alpha > 0) & (alpha < 255)
     if partial.any():
         colors = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
         pixels[partial, :3] = np.minimum(np.rint(colors), 255.0)
-    return pixels
 
 
 def _gigabytes(count: int) -> str:
