@@ -12,7 +12,7 @@ import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu import actor_buffers, posed_vertices
+from viewer.rendering.gpu import actor_buffers, context, posed_vertices
 from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX
@@ -414,7 +414,7 @@ def test_drivers_without_storage_buffers_draw_actors_one_by_one(offscreen, monke
     scene, size = rows_of_arms(FEWEST), (100, 75)
     camera, box = default_camera(scene, size), scene_box(scene)
     together = offscreen.render(scene, size, camera, DisplayOptions(), box)
-    monkeypatch.setattr(actor_buffers, "STORAGE_VERSION", 10_000)
+    monkeypatch.setattr(context, "STORAGE_VERSION", 10_000)
     assert offscreen.renderer.buffers.groups(scene.actors, DisplayOptions()) == []
     alone = offscreen.render(scene, size, camera, DisplayOptions(), box)
     assert (np.abs(together.astype(int) - alone).max(axis=-1) > 2).mean() < 0.001

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import moderngl
 
+from viewer.rendering.gpu.context import storage_limit
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX, SharedVertices
-from viewer.rendering.gpu.program import STORAGE_VERSION, Programs
+from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
@@ -117,9 +118,9 @@ class ActorBuffers:
 
     def groups(self, actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
         """Return the actors that are drawn together, as many as a storage buffer has room for."""
-        if self.context.version_code < STORAGE_VERSION:
+        limit = min(storage_limit(self.context), MOST_POSED // 4)
+        if not limit:
             return []
-        limit = min(self.context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"], MOST_POSED // 4)
         found: list[list[Actor]] = []
         for group in instance_groups(actors, options):
             size = BYTES_PER_VERTEX * self.mesh(group[0].figure).n_vertices

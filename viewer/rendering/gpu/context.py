@@ -21,7 +21,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RenderError, ViewerError
 from viewer.interrupts import deferred
 from viewer.rendering.gpu.egl_devices import set_log_level
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.program import STORAGE_VERSION, Programs
 
 _LIBEGL, _LIBGL = "libEGL.so.1", "libGL.so.1"
 _INSTALL = "on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
@@ -151,6 +151,16 @@ def is_software(context: moderngl.Context) -> bool:
     """Return whether rendering is done in software."""
     renderer = context.info["GL_RENDERER"].lower()
     return any(name in renderer for name in ("llvmpipe", "softpipe", "swrast", "software", "basic"))
+
+
+def storage_limit(context: moderngl.Context) -> int:
+    """Return the size of the largest storage buffer of shaders, bytes; 0 if there are none."""
+    info = context.info
+    # Drivers of OpenGL 4.3 need not offer storage buffers to vertex shaders.
+    if context.version_code < STORAGE_VERSION or not info["GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS"]:
+        return 0
+    limit: int = info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
+    return limit
 
 
 def explain_failure(text: str) -> str:

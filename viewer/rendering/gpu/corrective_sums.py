@@ -15,8 +15,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.context import storage_limit
 from viewer.rendering.gpu.ownership import Owner
-from viewer.rendering.gpu.program import STORAGE_VERSION, Programs, set_uniforms
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer, float32, reserved
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import Correctives, active_rows
@@ -29,6 +30,7 @@ WAYS: tuple[Way, ...] = ("processor", "card")
 _TRIAL = 0.05  # seconds of sums on the processor after which both ways are timed
 _TRIED = 64  # number of correctives in the trial: enough to outweigh the cost of a call
 _ACTORS, _COLUMNS = 8, 64  # actors per invocation, columns per work group: see correctives.comp
+_MOST_GROUPS = 65535  # number of work groups in a row that every driver allows
 _Rows: TypeAlias = NDArray[np.float32]
 
 
@@ -112,8 +114,9 @@ class CorrectiveSums:
         if isinstance(self.correctives.offsets, SparseOffsets):
             return False  # most of the work would be multiplications by 0
         count, vertices, _ = self.correctives.offsets.shape
-        limit: int = self.context.info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 0)
-        return self.context.version_code >= STORAGE_VERSION and 12 * count * vertices <= limit
+        if 3 * len(self.sources) > _COLUMNS * _MOST_GROUPS:
+            return False
+        return 0 < 12 * count * vertices <= storage_limit(self.context)
 
     def _on_processor(self, weights: Floats, rest: _Rows, out: moderngl.Buffer) -> None:
         sums = self._summed(weights).reshape(len(weights), -1, 3)
