@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from autorig.rigged_shapes import arm
 from numpy.testing import assert_allclose
 
 import viewer
@@ -16,6 +17,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
+from viewer.rig.skeleton import ball_skeleton
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
@@ -397,3 +399,72 @@ def test_result_is_shown_in_the_place_of_the_hidden_target(folder, monkeypatch, 
     assert result.visible and not target.visible
     posed = viewer.deform(result.figure, result.pose)[0]
     assert_allclose(posed, target.figure.mesh.positions, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    """A tube as a mesh, and its two joints as a .skel file."""
+    folder = tmp_path_factory.mktemp("bar")
+    figure = arm()
+    export(Actor(Figure("bar", figure.mesh)), folder / "bar.obj")
+    export(Actor(Figure("joints", skeleton=figure.skeleton)), folder / "joints.skel")
+    return folder
+
+
+@pytest.mark.parametrize("method", ["heat", "voxel"])
+def test_mesh_is_bound_to_a_skeleton_file(bar, tmp_path, capsys, method):
+    out = tmp_path / "bar.glb"
+    files = [str(bar / "bar.obj"), "--skeleton", str(bar / "joints.skel")]
+    assert run(["rig", *files, "--method", method, "-o", str(out)]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    lines = said.out.splitlines()
+    assert lines[0] == "skeleton: used where it is, 1 of 1 joint inside the mesh"
+    assert "2 joints bound" in lines
+    figure = viewer.load(out).actors[0].figure
+    assert figure.skeleton.names == ("base", "tip")
+    pose = rest_pose(figure.skeleton)
+    assert_allclose(viewer.deform(figure, pose)[0], arm().mesh.positions, atol=1e-6)
+
+
+def test_glb_of_a_new_rig_has_four_influences_unless_more_are_requested(tmp_path, capsys):
+    # Six joints in a row, close enough together for geodesic weights from all of them.
+    figure = arm()
+    places = np.zeros((6, 3))
+    places[:, 1] = 1.0 + 0.05 * np.arange(6)
+    names = tuple("abcdef")
+    skeleton = ball_skeleton(names, np.arange(-1, 5, dtype=np.int32), places)
+    export(Actor(Figure("bar", figure.mesh)), tmp_path / "bar.obj")
+    export(Actor(Figure("row", skeleton=skeleton)), tmp_path / "row.skel")
+    files = [str(tmp_path / "bar.obj"), "--skeleton", str(tmp_path / "row.skel")]
+    options = ["--scale", "none", "--method", "voxel"]
+    for more, most in (([], 4), (["--max-influences", "5"], 5)):
+        out = tmp_path / f"{most}.glb"
+        assert run(["rig", *files, *options, *more, "-o", str(out)]) == 0
+        skin = viewer.load(out).actors[0].figure.skin
+        assert np.diff(skin.starts).max() == most
+        notes = capsys.readouterr().out
+        assert ("limited to the 4 strongest influences" in notes) == (most == 4)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--from", "fox"], "--from and --skeleton: expected one of them, found both"),
+        (["--method", "robust"], "--method: expected heat or voxel with --skeleton, found robust"),
+        (["--max-angle", "20"], "--max-angle: expected a template (--from) to match, found "
+         "--skeleton"),
+    ],
+)  # fmt: skip
+def test_options_of_templates_are_refused_with_a_skeleton(bar, capsys, options, said):
+    files = [str(bar / "bar.obj"), "--skeleton", str(bar / "joints.skel")]
+    assert run(["rig", *files, *options]) == 2
+    assert capsys.readouterr().err == f"viewer: {said}\n"
+
+
+def test_skeleton_given_as_template_names_the_option(bar, capsys):
+    assert run(["rig", str(bar / "bar.obj"), "--from", str(bar / "joints.skel")]) == 2
+    assert capsys.readouterr().err == (
+        "viewer: --from: expected a figure with mesh, skeleton and skin, found none; bind to it by "
+        "--skeleton\n"
+    )

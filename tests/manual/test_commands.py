@@ -150,7 +150,7 @@ def cheaper(words: list[str]) -> list[str]:
         more += ["--trim", "98:102"]
     if "--turntable" in words:
         more += ["--fps", "2"]
-    if job == "rig":
+    if job == "rig" and "--skeleton" not in words:
         more += ["--method", "nearest"]
     if job == "render":
         size = "200x200" if "--panels" in words else "160x90"

@@ -23,7 +23,7 @@ from viewer.autorig.checks import (
 from viewer.autorig.correspondence import Template, with_reversed_winding
 from viewer.autorig.rigged import Rigged, with_fields
 from viewer.autorig.seed import nearest
-from viewer.autorig.settings import TransferSettings
+from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.autorig.transfer.inverse_skinning import invert_skinning, repair_tears
 from viewer.autorig.transfer.joint_transfer import boundary_weights, surface_shifts, transfer_joints
@@ -56,13 +56,22 @@ def transfer(
 ) -> Rigged:
     """Rig a mesh with the rig of another figure; ``Rigged.pose`` then reproduces the mesh."""
     how = settings or TransferSettings()
+    if target.n_triangles == 0:
+        raise RigError("expected a target with triangles, found none")
+    if how.method in BINDING:
+        from viewer.autorig.binding import bind
+
+        if template.skeleton is None:
+            raise RigError(f"{template.name}: expected a skeleton, found {_parts(template)}")
+        bound = bind(template, pose, target, how, name)
+        report_fraction(1.0, "done")
+        dropped = _dropped_parts(template, bound.figure, replace(how, correctives=False))
+        return replace(bound, lines=(*bound.lines, *dropped))
     if not template.is_attached:
         raise RigError(
             f"{template.name}: expected a template with mesh, skeleton and skin, found "
             f"{_parts(template)}"
         )
-    if target.n_triangles == 0:
-        raise RigError("expected a target with triangles, found none")
     figure = shaped(template, pose.shape_weights)
     # The shape has become part of the mesh.
     plain = pose.copy()
@@ -124,6 +133,7 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
         figure_scale=pose.figure_scale,
         path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
+        max_influences=how.weights.max_influences,
     )
 
 

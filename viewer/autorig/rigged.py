@@ -51,6 +51,8 @@ class Rigged:
     """Factors by which ``clip_for`` scales lengths."""
     lines: tuple[Diagnostic, ...]
     """Messages for the user."""
+    max_influences: int | None = None
+    """Limit of the influences per vertex that was requested; None for none."""
 
     @property
     def confidence(self) -> Ints:
@@ -59,13 +61,17 @@ class Rigged:
         return np.where(weights.matched, 0, np.where(weights.inpainted, 1, 2)).astype(np.int32)
 
 
-def with_fields(rigged: Rigged) -> Rigged:
+def with_fields(
+    rigged: Rigged,
+    origins: tuple[str, str, str] = _CONFIDENCE,
+    distance: str = "Distance to the template",
+) -> Rigged:
     """Return a copy with scalar fields that show the certainty of each vertex."""
     confidence = rigged.confidence.astype(np.float64)
     guarded = rigged.guarded.astype(np.float64)
     fields = (
-        VertexField("confidence", "Origin of weights", confidence, names=_CONFIDENCE),
-        VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
+        VertexField("confidence", "Origin of weights", confidence, names=origins),
+        VertexField("distance", distance, rigged.weights.distances, "length"),
         VertexField("guarded", "Rest position", guarded, names=("exact", "estimated")),
     )
     return replace(rigged, figure=replace(rigged.figure, fields=fields))

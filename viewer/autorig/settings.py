@@ -10,13 +10,19 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 
-TransferMethod: TypeAlias = Literal["robust", "nearest"]
+TransferMethod: TypeAlias = Literal["robust", "nearest", "heat", "voxel"]
 METHODS: dict[TransferMethod, str] = {
     "robust": "closest surface points if they agree, other weights inpainted (Abdrashitov et al. "
     "2023)",
     "nearest": "aligned boxes, nearest vertices, joints copied (Tex-An Mesh)",
+    "heat": "weights from the bones that the surface sees (Baran and Popović 2007)",
+    "voxel": "weights from paths through the inside, for many separate parts (Dionne and de Lasa "
+    "2013)",
 }
 """Methods offered by menus and the command line."""
+
+BINDING: tuple[TransferMethod, ...] = ("heat", "voxel")
+"""Methods that use only the template's skeleton, where it is."""
 
 JointPlaces: TypeAlias = Literal["surface", "alignment"]
 JOINTS: tuple[JointPlaces, ...] = ("surface", "alignment")
@@ -28,9 +34,11 @@ class TransferSettings:
     """Options of a rig transfer."""
 
     method: TransferMethod = setting(
-        "robust", "; ".join(f"{name}: {text}" for name, text in METHODS.items()), choices=METHODS
+        "robust",
+        "; ".join(f"{name}: {text}" for name, text in METHODS.items()) + "{usual}",
+        choices=METHODS,
     )
-    """All other options are for ``"robust"``."""
+    """All options but those of ``alignment`` and ``weights`` are for ``"robust"``."""
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     """Known facts about the alignment."""
     weights: WeightSettings = field(default_factory=WeightSettings)

@@ -26,7 +26,7 @@ from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
-from viewer.autorig.settings import TransferSettings
+from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
 from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
@@ -88,6 +88,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "other files of the figure or its motion",
     )
     parser.add_argument(
+        "--skeleton",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="bind the mesh to the skeleton of this file or model instead, where it is; repeat it "
+        "for other files of the skeleton or its motion",
+    )
+    parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
@@ -109,7 +117,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     group = parser.add_argument_group("method")
-    add_settings(group, TransferSettings, "method")
+    usual = f"; default: robust, or {BINDING[0]} with --skeleton"
+    add_settings(group, TransferSettings, "method", given=None, usual=usual)
     add_settings(group, MatchSettings)
     add_settings(group, WeightSettings)
     add_settings(group, TransferSettings, "joints", "fits", "correctives")
@@ -150,7 +159,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_meta(meta, output)
     pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
     named = [
-        *(*arguments.files, *arguments.template, *pose.files, *arguments.clips),
+        *(*arguments.files, *arguments.template, *arguments.skeleton),
+        *(*pose.files, *arguments.clips),
         *([arguments.landmarks] if arguments.landmarks else []),
     ]
     inputs = [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
@@ -166,10 +176,14 @@ def run(arguments: argparse.Namespace) -> int:
         if frames.frame is not None:
             raise ViewerError("--frame and --template-frame: expected one of them, found both")
         frames.frame, frames.option = arguments.template_frame, "--template-frame"
+    option = "--skeleton" if arguments.skeleton else "--from"
+    _check_options(arguments)
     template_files = [
-        file for name in arguments.template or ["body"] for file in _template_files(name)
+        file
+        for name in arguments.skeleton or arguments.template or ["body"]
+        for file in _template_files(name)
     ]
-    template = _template(template_files, arguments.rig or "", pose, frames, inputs)
+    template = _template(template_files, option, arguments.rig or "", pose, frames, inputs)
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
@@ -221,28 +235,71 @@ def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
     return Figure(figure.name, posed_mesh(figure, actor.pose))
 
 
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Check that the options for templates are not given together with a skeleton."""
+    if not arguments.skeleton:
+        return
+    if arguments.template:
+        raise ViewerError("--from and --skeleton: expected one of them, found both")
+    if arguments.method not in (None, *BINDING):
+        names = " or ".join(BINDING)
+        raise ViewerError(f"--method: expected {names} with --skeleton, found {arguments.method}")
+    own, usual = settings_of(TransferSettings, arguments), TransferSettings()
+    match, usual_match = settings_of(MatchSettings, arguments), MatchSettings()
+    only_for_templates = {
+        "--max-distance": match.max_distance != usual_match.max_distance,
+        "--max-angle": match.max_angle != usual_match.max_angle,
+        "--joints": own.joints != usual.joints,
+        "--no-fit": own.fits != usual.fits,
+    }
+    for option, is_given in only_for_templates.items():
+        if is_given:
+            raise ViewerError(f"{option}: expected a template (--from) to match, found --skeleton")
+
+
 def _template(
-    files: Sequence[Path], rig: str, pose: PoseOptions, frames: Frames, inputs: list[Path]
+    files: Sequence[Path],
+    option: str,
+    rig: str,
+    pose: PoseOptions,
+    frames: Frames,
+    inputs: list[Path],
 ) -> Actor:
-    """Return the figure whose rig is transferred, posed and shaped as requested."""
+    """Return the figure whose rig or skeleton is used, posed and shaped as requested."""
     scene = load(*files, motion=MotionSettings(frame_rate=frames.fps, rig=rig))
     inputs += scene.files
     if frames.is_one and all(actor.clip is None for actor in scene.actors):
-        option = "--time" if frames.frame is None else frames.option
+        asked = "--time" if frames.frame is None else frames.option
         raise ViewerError(
-            f"{option}: expected a template with a motion, found none; add the motion's file with "
+            f"{asked}: expected a template with a motion, found none; add the motion's file with "
             "another --from, as in --from body --from walk.npz"
         )
+    only_skeleton = option == "--skeleton"
+    if only_skeleton and not frames.is_one:
+        # The joints are where the file has them, not where its motion begins.
+        for actor in scene.actors:
+            if actor.figure.skeleton is not None:
+                actor.pose = figure_pose(actor.figure)
     print_warnings([*scene.diagnostics, *apply_pose(scene, pose, frames)])
-    attached = [actor for actor in scene.actors if actor.figure.is_attached]
-    if not attached:
-        raise RigError("--from: expected a figure with mesh, skeleton and skin, found none")
-    if len(attached) > 1:
-        name = printable(attached[0].name, 60)
-        print_warnings([f"--from: {len(attached)} figures; the first one, {name}, is the template"])
-    if not attached[0].is_present:
-        raise RigError("--from: expected a frame of the template, found a gap")
-    return attached[0]
+    found = [
+        actor
+        for actor in scene.actors
+        if actor.figure.is_attached or (only_skeleton and actor.figure.skeleton is not None)
+    ]
+    if not found:
+        wanted = "skeleton" if only_skeleton else "figure with mesh, skeleton and skin"
+        hint = "" if only_skeleton or not _has_skeleton(scene) else "; bind to it by --skeleton"
+        raise RigError(f"{option}: expected a {wanted}, found none{hint}")
+    if len(found) > 1:
+        name = printable(found[0].name, 60)
+        print_warnings([f"{option}: {len(found)} figures; the first one, {name}, is the template"])
+    if not found[0].is_present:
+        raise RigError(f"{option}: expected a frame of the template, found a gap")
+    return found[0]
+
+
+def _has_skeleton(scene: Scene) -> bool:
+    return any(actor.figure.skeleton is not None for actor in scene.actors)
 
 
 def _template_files(name: str) -> list[Path]:
@@ -269,6 +326,8 @@ def _settings(
         alignment=settings_of(AlignmentSettings, arguments, landmarks=landmarks),
         weights=settings_of(WeightSettings, arguments, match=settings_of(MatchSettings, arguments)),
     )
+    if arguments.skeleton and arguments.method is None:
+        settings = replace(settings, method=BINDING[0])
     as_rig = output is not None and output.suffix.lower() != ".npz"
     return replace(settings, correctives=False) if as_rig else settings
 
@@ -376,7 +435,7 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
     print_warnings(scene.diagnostics)
     for actor in scene.actors:
         clip = actor.joint_motion
-        if actor.figure.is_attached and clip is not None:
+        if actor.figure.skeleton is not None and clip is not None:
             return baked(actor.figure, clip, fps) if clip.kind == "transforms" else clip
     raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")
 

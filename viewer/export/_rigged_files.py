@@ -14,13 +14,14 @@ from viewer.export import VrmMeta, export, files_written
 from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted
 from viewer.rig.arrays import Arrays
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import pose_weights
+from viewer.rig.skin import influence_counts, limit_influences
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
@@ -28,6 +29,7 @@ RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 
 _RIG = (".skel", ".skin", ".obj", ".json")
 _NODES = (".glb", ".gltf", ".vrm")
+_USUAL_INFLUENCES = 4  # per vertex: what game engines and web viewers read of such files
 
 
 def files_of(output: Path) -> list[Path]:
@@ -66,6 +68,7 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:
+        figure, limited = _limited(figure, rigged.max_influences)
         notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
         notes.append(
             Diagnostic(
@@ -73,6 +76,7 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
                 "pose"
             )
         )
+        notes += limited
         if rigged.figure.correctives is not None:
             notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
         return notes
@@ -87,6 +91,26 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     if rigged.figure.correctives is not None:
         notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
     return notes
+
+
+def _limited(figure: Figure, requested: int | None) -> tuple[Figure, list[Diagnostic]]:
+    """Return the figure with the usual influences per vertex, unless a limit was requested."""
+    skin = figure.require_skin()
+    over = int((influence_counts(skin) > _USUAL_INFLUENCES).sum())
+    if requested is not None or not over:
+        return figure, []
+    said = Diagnostic(
+        "X003.influences: {n} limited to the {most} strongest influences: {remedy}",
+        values={
+            "n": counted(over, "vertex"),
+            "most": _USUAL_INFLUENCES,
+            "remedy": Remedy(
+                "Max. influences keeps more, and .npz and .skel all",
+                "--max-influences N keeps more, and .npz and .skel all",
+            ),
+        },
+    )
+    return replace(figure, skin=limit_influences(skin, _USUAL_INFLUENCES)), [said]
 
 
 def _posed_skeleton(figure: Figure, pose: Pose) -> tuple[Figure, Pose]:

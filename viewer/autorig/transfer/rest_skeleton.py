@@ -76,15 +76,15 @@ def fit_rest_skeleton(
     offsets[0] = scale * skeleton.rest_translations[0]
     if transferred is not None:
         offsets = _symmetric(template, offsets, scale, transferred)
-    provisional = _with_offsets(skeleton, offsets, np.full(len(roots), scale))
+    provisional = with_offsets(skeleton, offsets, np.full(len(roots), scale))
     root_scale = leg_scale(original or skeleton, provisional, template.up, scale)
     offsets[roots] += (root_scale - scale) * skeleton.rest_translations[0]
     longer = offsets - scale * skeleton.rest_translations
     joint_scales = np.where(roots, root_scale, scale)
-    fitted = _with_offsets(skeleton, offsets, joint_scales)
+    fitted = with_offsets(skeleton, offsets, joint_scales)
     if skeleton.boxes is not None:
         fitted = replace(fitted, boxes=scale * skeleton.boxes)
-    posed = _scaled_pose(skeleton, pose, joint_scales)
+    posed = scaled_pose(skeleton, pose, joint_scales)
     fitted, lines = _rotate_roots(fitted, posed, similarity.rotation)
     _move_roots(fitted, posed, joints)
     bind = _bind_matrices(skeleton.parents, skin.inverse_bind, longer, scale)
@@ -138,7 +138,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     return symmetric
 
 
-def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:
+def with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:
     """Return a skeleton with new rest offsets (J, 3) and its lengths scaled by (J,)."""
     scales = _dof_scales(skeleton, joint_scales)
     return replace(
@@ -154,7 +154,7 @@ def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
     return np.where(is_move, joint_scales[skeleton.dof_joints], 1.0)
 
 
-def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
+def scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
     """Return a pose in the target's unit, without the figure's shape, scale and translation."""
     posed = pose.copy()
     posed.dofs *= _dof_scales(skeleton, joint_scales)

@@ -117,13 +117,21 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> Iterator[Diagn
         )
 
 
-def rigid_lines(rigid: RigidIslands) -> Iterator[Diagnostic]:
+def rigid_lines(rigid: RigidIslands, from_bones: bool = False) -> Iterator[Diagnostic]:
     """Return a message for each of the largest rigid islands, and one for the others."""
+    key = (
+        "R007.part: the part of {n} at vertex {vertex} has no match in the template: it moves "
+        "rigidly, mostly with joint {joint}"
+    )
+    if from_bones:
+        key = (
+            "R007.bone-part: the part of {n} at vertex {vertex} is nearest to one bone: it moves "
+            "rigidly with joint {joint}"
+        )
     order = np.argsort(-rigid.counts, kind="stable")
     for island in order[:_LISTED]:
         yield note(
-            "R007.part: the part of {n} at vertex {vertex} has no match in the template: it "
-            "moves rigidly, mostly with joint {joint}",
+            key,
             n=counted(int(rigid.counts[island]), "vertex"),
             vertex=int(rigid.vertices[island]),
             joint=int(rigid.joints[island]),

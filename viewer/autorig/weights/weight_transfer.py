@@ -251,7 +251,7 @@ def inpaint(
         ("harmonic", rows[:, wanted], harmonic_border),
         ("harmonic, conjugate gradients", rows[:, wanted], harmonic_border),
     ):
-        solve = _iterative(matrix) if "conjugate" in method else _factorised(matrix)
+        solve = conjugate_gradients(matrix) if "conjugate" in method else factorised(matrix)
         if solve is not None and _is_true(solve, known):
             return _solved(solve, known, weights[given]), method
     raise RigError(
@@ -293,7 +293,7 @@ def _shifted(matrix: csr_array) -> csr_array:
     return matrix + sparse.diags_array(np.full(matrix.shape[0], shift))
 
 
-def _factorised(matrix: csr_array) -> _Solve | None:
+def factorised(matrix: csr_array) -> _Solve | None:
     """Return a solver by sparse factorisation, or None if that fails."""
     from scipy.sparse import linalg as linear
 
@@ -310,7 +310,7 @@ def _factorised(matrix: csr_array) -> _Solve | None:
     return lambda right: factors.solve(right)
 
 
-def _iterative(matrix: csr_array) -> _Solve:
+def conjugate_gradients(matrix: csr_array) -> _Solve:
     """Return a solver by conjugate gradients for all columns, with diagonal preconditioner."""
     diagonal = matrix.diagonal()
     scale = np.divide(1.0, diagonal, out=np.ones_like(diagonal), where=diagonal > 0.0)[:, None]

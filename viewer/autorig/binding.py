@@ -1,0 +1,395 @@
+"""Binding of a mesh to a given skeleton: its place in the mesh, and weights from its bones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from viewer.autorig.alignment.orientation_search import axis_rotations
+from viewer.autorig.alignment.similarity import Similarity, fit_similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings, similarity_of
+from viewer.autorig.checks import check_lines, residual_of, with_joint_name
+from viewer.autorig.rigged import Rigged, with_fields
+from viewer.autorig.settings import TransferSettings
+from viewer.autorig.solid import Solid, solid_of
+from viewer.autorig.surface.welding import Welded, weld
+from viewer.autorig.transfer.rest_skeleton import scaled_pose, with_offsets
+from viewer.autorig.weights.bone_weights import (
+    NEAR,
+    Bones,
+    BoneWeights,
+    bone_heat,
+    bones_in,
+    gaps,
+    geodesic_voxels,
+    names_control,
+)
+from viewer.autorig.weights.result import RigidIslands, WeightTransfer, rigid_lines
+from viewer.autorig.weights.weight_transfer import skin_of, smooth
+from viewer.diagnostics import Diagnostic, note
+from viewer.errors import RigError
+from viewer.phrases import counted, listed, printable, rounded
+from viewer.progress import part_of_work, report_fraction
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations as about_axis
+from viewer.rig.geometry.transform import affine_matrices, apply_transform
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import Pose, placement_matrix
+from viewer.rig.shape import shaped_skeleton
+from viewer.rig.skeleton import Skeleton, joint_label, shown_joints
+from viewer.rig.skin import Skin, idle_joints, skin_rows
+from viewer.rig.units import METRES, unit_of_scaled
+
+_Weigh = Callable[[Welded, Solid, Bones], BoneWeights]
+_METHODS: dict[str, tuple[_Weigh, str]] = {
+    "heat": (bone_heat, "bone heat"),
+    "voxel": (geodesic_voxels, "geodesic voxels"),
+}
+
+# Place of the skeleton.
+_ENOUGH = 0.5  # fraction of joints inside with which a skeleton may be where it should be
+_MUCH_BETTER = 0.25  # difference of that fraction that another place needs
+_SURELY = 0.75  # fraction of joints inside that another place needs
+# Sizes of the joints' box relative to the mesh's, in place and anywhere else: a skeleton in the
+# wrong unit may be a point inside the mesh, or be so large that only its root is there.
+_SIZES, _LIKELY_SIZES = (0.15, 3.0), (0.4, 1.5)
+_UNITS = (1.0, *sorted({a / b for a, b in product(METRES.values(), repeat=2) if a != b}))
+# Fraction of joints inside that a place needs if the skeleton may also slide, and the difference
+# from the best up to which places are alike.
+_SLID, _ALIKE = 0.85, 0.1
+# Networks that predict skeletons scale the longest side of a mesh to 2, centred, or to 1.
+_NORMALISED = (2.0, 1.0)
+_ROUNDING = 1e-9
+
+
+def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
+    """Bind a mesh to the posed skeleton of a figure; see ``transfer``, which checks the mesh."""
+    report_fraction(0.0, "voxels")
+    mesh = weld(target.positions, target.triangles)
+    with part_of_work(span=(0.0, 0.2)):
+        solid = solid_of(target.positions, target.triangles)
+    skeleton = shaped_skeleton(source, pose.shape_weights)
+    report_fraction(0.2, "placing the skeleton")
+    place = placement_matrix(pose)
+    joints = apply_transform(place, world_matrices(skeleton, pose)[:, :3, 3])
+    asked = _asked(source, skeleton)
+    moved, placed = _placed(source, joints, asked, solid, how.alignment)
+    skeleton, posed, turn = _moved(skeleton, pose, moved)
+    worlds = world_matrices(skeleton, posed)
+    bones = bones_in(solid, skeleton, turn @ worlds, _deforming(source))
+    if len(bones.joints) == 0:
+        size = moved.scale * _ratio(joints[asked], solid)
+        raise _misplaced(source, 0, int(asked.sum()), size)
+    with part_of_work(span=(0.25, 0.9)):
+        weigh, title = _METHODS[how.method]
+        found = weigh(mesh, solid, bones)
+    report_fraction(0.9, "checking the result")
+    rows = found.rows
+    if how.weights.smoothing_rounds:
+        active = found.rigid[mesh.islands] < 0
+        rows = smooth(rows, mesh.triangles, active, how.weights.smoothing_rounds)
+    skin = skin_of(rows, _inverse(source, skeleton, worlds), how.weights.max_influences)
+    skin = skin_rows(skin, mesh.vertices)
+    rotation = turn[:3, :3]
+    own = target
+    if not np.array_equal(rotation, np.eye(3)):
+        own = replace(
+            target, positions=target.positions @ rotation, normals=target.normals @ rotation
+        )
+    figure = Figure(
+        name=name,
+        mesh=own,
+        skeleton=skeleton,
+        skin=skin,
+        up=source.up,
+        unit=unit_of_scaled(source.unit, moved.scale),
+        hands=source.hands,
+        pose_layout=source.pose_layout,
+        facts=(("rig", f"bound to the skeleton of {source.name} by {title}"),),
+    )
+    weights = _result(mesh, found, skin)
+    guarded = np.zeros(target.n_vertices, dtype=np.bool_)
+    residual = residual_of(figure, posed, turn, target)
+    out = tuple(np.flatnonzero(bones.outside).tolist())
+    lines = (
+        placed,
+        *_weight_lines(mesh, found, how.method),
+        *(with_joint_name(line, figure) for line in rigid_lines(weights.rigid, from_bones=True)),
+        *_bone_lines(skeleton, bones),
+        *check_lines(figure, guarded, out, residual),
+    )
+    rigged = Rigged(
+        figure=figure,
+        pose=posed,
+        placement=turn,
+        alignment=None,
+        weights=weights,
+        guarded=guarded,
+        residual=residual,
+        outside=out,
+        length_scale=moved.scale,
+        figure_scale=1.0,
+        path_scale=moved.scale,
+        lines=lines,
+        max_influences=how.weights.max_influences,
+    )
+    return with_fields(rigged, ("sees a bone", "diffused", "rigid"), "Distance to the bone")
+
+
+def _deforming(source: Figure) -> Bools | None:
+    """Return the joints (J,) with weights in the skeleton's own figure; None if it has no skin."""
+    if not source.is_rigged:
+        return None
+    idle = idle_joints(source.require_skin(), source.skeleton)
+    found = np.ones(source.require_skeleton().n_joints, dtype=np.bool_)
+    found[idle] = False
+    return found
+
+
+def _asked(source: Figure, skeleton: Skeleton) -> Bools:
+    """Return the joints (J,) that should be inside the mesh: no roots, no controls."""
+    drawn = np.zeros(skeleton.n_joints, dtype=np.bool_)
+    drawn[shown_joints(skeleton)] = True
+    deforming = _deforming(source)
+    if deforming is None:
+        deforming = ~names_control(skeleton)
+    wanted = drawn & deforming & (skeleton.parents >= 0)
+    return wanted if wanted.any() else drawn
+
+
+def _placed(
+    source: Figure, joints: Floats, asked: Bools, solid: Solid, how: AlignmentSettings
+) -> tuple[Similarity, Diagnostic]:
+    """Return the map of a skeleton into the mesh, and a message about it."""
+    points = joints[asked]
+    scale = 1.0 if how.scale == "none" else None
+    if how.scale == "axes":
+        raise RigError("--scale axes: expected uniform or none for a skeleton, found axes")
+    pairs, given = how.landmarks, None
+    if how.matrix is not None:
+        given = similarity_of(how.matrix)
+    elif pairs is not None:
+        given = fit_similarity(pairs[:, 0], pairs[:, 1], scale)
+    if given is not None:
+        inside = _counts_inside(solid, points, [given])[0]
+        if inside == 0:
+            raise _misplaced(source, 0, len(points), given.scale * _ratio(points, solid))
+        return given, _placed_line(given, inside, len(points), None)
+    candidates = _candidates(source, solid, how)
+    count = len(points)
+    low, high = _SIZES if count > 1 and how.scale != "none" else (0.0, np.inf)
+    size = _ratio(points, solid)
+    first = _counts_inside(solid, points, candidates[:1])[0]
+    as_is = first / count if low <= size * candidates[0].scale <= high else 0.0
+    if as_is == 1.0:
+        return candidates[0], _placed_line(candidates[0], count, count, None)
+    counts = _counts_inside(solid, points, candidates)
+    sizes = size * np.array([each.scale for each in candidates])
+    low, high = _LIKELY_SIZES
+    shares = np.where((low <= sizes) & (sizes <= high), np.array(counts) / count, 0.0)
+    best = int(shares.argmax())
+    if as_is >= _ENOUGH and as_is > shares[best] - _MUCH_BETTER:
+        return candidates[0], _placed_line(candidates[0], first, count, None)
+    if shares[best] < _SURELY:
+        likely = [
+            place
+            for place, ratio in zip(candidates, sizes.tolist(), strict=True)
+            if low <= ratio <= high
+        ]
+        slid = [_slid(solid, points, place) for place in likely]
+        found = np.array(_counts_inside(solid, points, slid) if slid else [0]) / count
+        # Of places that are nearly as good, the first is the least changed one.
+        best = int((found >= found.max() - _ALIKE).argmax())
+        if found[best] < _SLID:
+            raise _misplaced(source, first, count, size)
+        return slid[best], _placed_line(slid[best], round(found[best] * count), count, first)
+    before = first if best else None
+    return candidates[best], _placed_line(candidates[best], counts[best], count, before)
+
+
+def _candidates(source: Figure, solid: Solid, how: AlignmentSettings) -> list[Similarity]:
+    """Return possible places of a skeleton, the most likely first: as it is, in other units."""
+    if how.up is None and how.facing is None:
+        # Other up axes, then other facings: quarter turns about x and about the skeleton's own up.
+        about_up, quarters = "xyz".index(source.up), np.pi / 2 * np.arange(4)
+        rotations = [
+            np.round(about_axis(0, np.asarray(tilt)) @ about_axis(about_up, np.asarray(turn))) + 0.0
+            for turn in quarters
+            for tilt in (0.0, np.pi / 2, -np.pi / 2)
+        ]
+    else:
+        rotations = axis_rotations(source.up, how.up, how.facing)
+    centers = solid.centers(solid.voxels)
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    middle, longest = 0.5 * (low + high), float((high - low).max())
+    places = [(unit, np.zeros(3)) for unit in (_UNITS if how.scale != "none" else (1.0,))]
+    if how.scale != "none":
+        places += [(longest / side, middle) for side in _NORMALISED]
+    return [
+        Similarity(scale, rotation, shift, np.ones(3))
+        for scale, shift in places
+        for rotation in rotations
+    ]
+
+
+def _slid(solid: Solid, points: Floats, place: Similarity) -> Similarity:
+    """Return a place moved to where most points are inside, and far from the surface."""
+    # The root of a .bvh file is often at the origin. From matching boxes, all 26 directions are
+    # tried with steps from an eighth of the mesh down to a voxel.
+    there = place.scale * points @ place.rotation.T
+    middle = solid.origin + 0.5 * solid.spacing * (np.array(solid.inside.shape) - 1)
+    shift = middle - 0.5 * (there.min(axis=0) + there.max(axis=0))
+    ways = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+    ways = ways[np.argsort(np.abs(ways).sum(axis=1), kind="stable")]
+    step = 0.125 * solid.spacing * max(solid.inside.shape)
+    while step >= solid.spacing:
+        moved = there + (shift + step * ways)[:, None]
+        depths = solid.distance[tuple(np.moveaxis(solid.voxel_of(moved), -1, 0))]
+        inside = (depths > 0.0).sum(axis=1)
+        score = inside + depths.mean(axis=1) / (solid.spacing * max(solid.inside.shape))
+        best = int(score.argmax())
+        shift = shift + step * ways[best]
+        if best == 0:  # no direction is better
+            step *= 0.5
+    return replace(place, shift=shift)
+
+
+def _counts_inside(solid: Solid, points: Floats, places: list[Similarity]) -> list[int]:
+    """Return how many of the points are inside with each of the maps."""
+    moved = np.concatenate([place.apply(points) for place in places])
+    inside = gaps(solid, moved) <= NEAR * solid.spacing
+    return [int(row.sum()) for row in inside.reshape(len(places), len(points))]
+
+
+def _ratio(points: Floats, solid: Solid) -> float:
+    """Return the longest side of the joints' box over that of the mesh's."""
+    mesh = float(np.ptp(solid.voxels, axis=0).max() + 1) * solid.spacing
+    return float(np.ptp(points, axis=0).max()) / mesh
+
+
+def _placed_line(found: Similarity, inside: int, count: int, before: int | None) -> Diagnostic:
+    """Return the message about a skeleton's place; ``before``: joints inside without moving it."""
+    values = {"inside": inside, "all": counted(count, "joint")}
+    matrix = found.matrix
+    if np.array_equal(matrix, np.eye(4)):
+        return note(
+            "R001.skeleton: skeleton: used where it is, {inside} of {all} inside the mesh", **values
+        )
+    angle = np.degrees(np.arccos(np.clip(0.5 * (np.trace(found.rotation) - 1.0), -1.0, 1.0)))
+    moved = {"scale": rounded(found.scale, 6), "angle": float(angle), **values}
+    # A fit leaves rounding errors where nothing moves.
+    shift = np.where(np.abs(found.shift) > _ROUNDING * np.abs(found.shift).max(), found.shift, 0.0)
+    moved |= dict(zip("xyz", shift.tolist(), strict=True))
+    if before is None:
+        return note(
+            "R001.skeleton-given: skeleton: scale {scale}, rotation {angle:.2f} degrees, "
+            "translation ({x:z.4g}, {y:z.4g}, {z:z.4g}); {inside} of {all} inside the mesh",
+            **moved,
+        )
+    return note(
+        "R001.skeleton-moved: skeleton: scale {scale}, rotation {angle:.2f} degrees, translation "
+        "({x:z.4g}, {y:z.4g}, {z:z.4g}); {inside} of {all} inside the mesh, {before} where it was",
+        before=before,
+        **moved,
+    )
+
+
+def _misplaced(source: Figure, inside: int, count: int, size: float) -> RigError:
+    return RigError(
+        f"skeleton {printable(source.name, 60)}: expected its joints inside the mesh, found "
+        f"{inside} of {count} there and a skeleton {size:.2g} times as large as the mesh; other "
+        "units and up axes fit no better: place it with --landmarks, or pose it with "
+        "--template-pose or --template-frame"
+    )
+
+
+def _moved(skeleton: Skeleton, pose: Pose, place: Similarity) -> tuple[Skeleton, Pose, Floats]:
+    """Return a scaled and shifted skeleton, its pose, and the rotation that maps it to the mesh.
+
+    The rotation stays outside of the skeleton, so that its root keeps its axes, limits and clips.
+    """
+    own = placement_matrix(pose)
+    scale = place.scale * pose.figure_scale
+    # R s (p + t) = R (s p + R^-1 (s R t_own + t)).
+    shift = (place.apply(own[:3, 3])) @ place.rotation
+    scales = np.full(skeleton.n_joints, scale)
+    offsets = scale * skeleton.rest_translations
+    offsets[skeleton.parents < 0] += shift
+    moved = with_offsets(skeleton, offsets, scales)
+    if skeleton.boxes is not None:
+        moved = replace(moved, boxes=scale * skeleton.boxes)
+    if scale == 1.0 and not shift.any():
+        moved = skeleton
+    turn = affine_matrices(place.rotation, np.zeros(3))
+    return moved, scaled_pose(skeleton, pose, scales), turn
+
+
+def _inverse(source: Figure, skeleton: Skeleton, worlds: Floats) -> Floats:
+    """Return the inverse bind matrices (J, 4, 4); ``RigError`` if a joint has no inverse."""
+    flat = np.flatnonzero(np.abs(np.linalg.det(worlds[:, :3, :3])) < np.finfo(float).tiny)
+    if len(flat):
+        raise RigError(
+            f"skeleton {printable(source.name, 60)}: expected joints with a scale, found 0 at "
+            f"{joint_label(skeleton, int(flat[0]))}"
+        )
+    return np.asarray(np.linalg.inv(worlds), dtype=np.float64)
+
+
+def _result(mesh: Welded, found: BoneWeights, skin: Skin) -> WeightTransfer:
+    """Return the weights with their origin, for the vertices that were welded."""
+    welded, islands = mesh.vertices, np.flatnonzero(found.rigid >= 0)
+    is_rigid = found.rigid[mesh.islands] >= 0
+    sees = (found.nearest >= 0) & ~is_rigid
+    counts = np.bincount(mesh.islands, minlength=mesh.n_islands)
+    rows = np.unique(mesh.islands, return_index=True)[1][islands]
+    first = np.unique(welded, return_index=True)[1][rows].astype(np.int32)
+    known = np.where(np.isfinite(found.distances), found.distances, 0.0)
+    rigid = RigidIslands(first, counts[islands].astype(np.int32), found.rigid[islands], known[rows])
+    return WeightTransfer(
+        starts=skin.starts,
+        joints=skin.joints,
+        weights=skin.weights,
+        matched=sees[welded],
+        inpainted=(~sees & ~is_rigid)[welded],
+        distances=known[welded],
+        angles=np.zeros(len(welded)),
+        points=None,
+        backwards=np.zeros(len(welded), dtype=np.bool_),
+        rigid=rigid,
+        lines=(),
+    )
+
+
+def _weight_lines(mesh: Welded, found: BoneWeights, method: str) -> Iterator[Diagnostic]:
+    """Return messages about the origin of weights."""
+    count = len(found.nearest)
+    if method == "voxel":
+        yield note("R005.voxels: weights by distance from the bones through the solid")
+        return
+    sees = int((found.nearest >= 0).sum())
+    yield note(
+        "R005.heat: {n} of {all} vertices see a bone; the others take their weights from the "
+        "surface around them",
+        n=sees,
+        all=count,
+    )
+
+
+def _bone_lines(skeleton: Skeleton, bones: Bones) -> Iterator[Diagnostic]:
+    """Return a message about the joints without weights."""
+    joints = bones.joints
+    idle = np.setdiff1d(shown_joints(skeleton), joints)
+    labels = [joint_label(skeleton, joint) for joint in idle.tolist()]
+    if not labels:
+        yield note("R008.bones: {n} bound", n=counted(len(joints), "joint"))
+        return
+    yield note(
+        "R008.some-bones: {n} bound; no bone in the mesh, so no weights: {idle}",
+        n=counted(len(joints), "joint"),
+        idle=listed(labels, 8),
+    )
