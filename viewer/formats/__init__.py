@@ -120,6 +120,9 @@ FORMATS = {
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
     ),
     "rig": Format("rig (CSE169)", (".rig",), rb"\Arig\b[^{}]*\{", writes=False),
+    "rignet": Format(
+        "rig text (RigNet)", (".txt",), rb"\Ajoints[ \t]+\S+[ \t]+[-+.\d]", writes=False
+    ),
     "obj": Format(
         "mesh (Wavefront)",
         (".obj",),
