@@ -307,17 +307,18 @@ def test_swinging_feet_do_not_sink_into_the_ground():
     assert min(after[name][:, 1].min() for name in TOES) > -0.3
 
 
-def detached(figure: Figure, is_turned: bool) -> Figure:
+def detached(figure: Figure, is_turned: bool, above_feet: str = "Root") -> Figure:
     """Return a person as animators' controls leave it: feet, listed first, are joints of a root.
 
-    ``is_turned``: the root has other axes than the world.
+    ``is_turned``: the root has other axes than the world. ``above_feet``: "" for feet that are
+    roots.
     """
     skeleton = figure.skeleton
     world = dict(zip(skeleton.names, rest_joints(figure), strict=True))
     above = dict(zip(skeleton.names, parents(figure), strict=True))
     feet = ("LeftFoot_", "RightFoot_")
     table = {"Root": ("", np.array([0.0, 0.0, -5.0]))}
-    table |= {name: ("Root", world[name]) for name in feet}
+    table |= {name: (above_feet, world[name]) for name in feet}
     rest = [name for name in skeleton.names if name not in feet]
     table |= {name: (above[name] or "Root", world[name]) for name in rest}
     found = figure_of(table, "detached")
@@ -336,13 +337,13 @@ def detached(figure: Figure, is_turned: bool) -> Figure:
     )
 
 
-@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize("how", [(False, "Root"), (True, "Root"), (False, "")])
 @pytest.mark.parametrize("plants", [False, True])
-def test_feet_that_are_joints_of_the_root_follow_their_legs(plants, is_turned):
+def test_feet_that_are_joints_of_the_root_follow_their_legs(plants, how):
     # The same person with feet below the shins has the same world positions in every frame.
     motion = written(t_pose(), *walk(), rate=RATE)
     drive = Drive(motion, "auto", plants_feet=plants)
-    apart = detached(OTHER, is_turned)
+    apart = detached(OTHER, *how)
     whole, _ = driven_clip(drive, OTHER)
     clip, notes = driven_clip(drive, apart)
     wanted, found = places(OTHER, whole), places(apart, clip)

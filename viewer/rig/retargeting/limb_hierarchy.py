@@ -74,10 +74,13 @@ class LimbFigure:
             if int(mine.parents[new]) == above:
                 continue
             # With the worlds W of the joint and P of its parent, the local matrix is P^-1 W.
-            away = worlds[:, new, :3, 3] - worlds[:, above, :3, 3]
-            local = np.linalg.solve(worlds[:, above, :3, :3], away[..., None])[..., 0]
+            local, rotation = worlds[:, new, :3, 3], spun[:, new]
+            if above >= 0:
+                away = (local - worlds[:, above, :3, 3])[..., None]
+                local = (np.linalg.inv(worlds[:, above, :3, :3]) @ away)[..., 0]
+                rotation = multiply(conjugate(spun[:, above]), rotation)
             offsets[:, joint] = local - theirs.rest_translations[joint]
-            rotations[:, joint] = multiply(conjugate(spun[:, above]), spun[:, new])
+            rotations[:, joint] = rotation
         moved = offsets if offsets.any() else None
         return replace(clip, rotations=rotations, translations=moved)
 
