@@ -484,17 +484,24 @@ def _limbs_at_rest(
         )
     is_still, is_moving = _extent(rotations)
     for upper, lower, _ in _LIMBS:
-        joints = [places.get(f"{side}_{part}", -1) for part in (upper, lower) for side in _SIDES]
-        if min(joints) < 0 or (matches.partners[joints] < 0).any():
-            continue
-        if is_moving[joints[:2]].all() and is_still[joints[2:]].all():
+        pairs = [[places.get(f"{side}_{part}", -1) for part in (upper, lower)] for side in _SIDES]
+        stiff = [
+            end
+            for start, end in pairs
+            if min(start, end) >= 0 and is_moving[start] and is_still[end]
+            if min(matches.partners[start], matches.partners[end]) >= 0
+        ]
+        if stiff:
             warn(
-                "C018.limbs-still: {names} of {figure} never bend, because {partners} of "
-                "{motion} never do; if this is wrong, match other joints in the Joint match "
+                "C018.limbs-still: {names} of {figure} never {bend}, because {partners} of "
+                "{motion} never {do}; if this is wrong, match other joints in the Joint match "
                 "panel{remedy}",
                 **called,
-                names=listed([mine[joint] for joint in joints[2:]]),
-                partners=listed([theirs[matches.partners[joint]] for joint in joints[2:]]),
+                n=len(stiff),
+                names=listed([mine[joint] for joint in stiff]),
+                partners=listed([theirs[matches.partners[joint]] for joint in stiff]),
+                bend=agree(len(stiff), "bends", "bend"),
+                do=agree(len(stiff), "does", "do"),
                 remedy=remedy,
             )
     return found
