@@ -13,7 +13,7 @@ from PIL import Image
 
 from viewer.errors import FormatError
 from viewer.media import image
-from viewer.media.image import decode_picture, decode_pictures, decoding_pictures
+from viewer.media.image import decode_picture, decode_pictures, decoding_pictures, save_image
 from viewer.media.png import encode_png
 
 
@@ -155,3 +155,21 @@ def test_png_without_isal_contains_every_pixel(monkeypatch):
     pixels = noise(20, 30, seed=3)
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         np.testing.assert_array_equal(np.array(picture), pixels)
+
+
+@pytest.mark.parametrize("suffix", [".ppm", ".tif", ".tga", ".png"])
+@pytest.mark.parametrize("alpha", [255, 90])
+@pytest.mark.parametrize("order", [1, -1])
+def test_lossless_formats_contain_every_pixel_in_either_order_of_rows(
+    tmp_path, suffix, alpha, order
+):
+    """Rendered images have their last row first in memory."""
+    pixels = noise(5, 7, seed=4)
+    pixels[..., 3] = alpha
+    size = save_image(tmp_path / f"a{suffix}", pixels[::order])
+    assert size == (tmp_path / f"a{suffix}").stat().st_size
+    with Image.open(tmp_path / f"a{suffix}") as picture:
+        is_rgb = alpha == 255 or suffix == ".ppm"
+        assert picture.mode == ("RGB" if is_rgb else "RGBA")
+        wanted = pixels[::order, :, : 3 if is_rgb else 4]
+        np.testing.assert_array_equal(np.array(picture), wanted)

@@ -200,9 +200,12 @@ def _encoded(path: Path, pixels: Bytes) -> bytes:
     if kind == "PNG":
         return encode_png(pixels)
     stream = io.BytesIO()
-    picture = Image.fromarray(pixels)
-    if kind in ("JPEG", "PPM") or (pixels[..., 3] == 255).all():
-        picture = picture.convert("RGB")
+    is_rgb = kind in ("JPEG", "PPM") or int(pixels[..., 3].min()) == 255
+    mode, raw = ("RGB", "RGBX") if is_rgb else ("RGBA", "RGBA")
+    # Rendered images have their last row first in memory: Pillow reads them from there.
+    order = -1 if pixels.strides[0] < 0 else 1
+    rows = np.ascontiguousarray(pixels[::order])
+    picture = Image.frombytes(mode, (rows.shape[1], rows.shape[0]), rows, "raw", raw, 0, order)
     try:
         picture.save(stream, kind)
     except (KeyError, ValueError, OSError):  # raised by Pillow
