@@ -67,8 +67,9 @@ def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data):
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
 def test_synthetic_models_and_captures_have_no_findings(shared_data, name):
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
-    # One of the two captured people has an unrelated pose in every frame.
-    assert {code for code, _ in heavy(findings)} == ({"C014"} if name == "easymocap" else set())
+    # One of the two captured people has an unrelated pose in every frame, some with bent elbows.
+    expected = {"C014", "C024"} if name == "easymocap" else set()
+    assert {code for code, _ in heavy(findings)} == expected
 
 
 @pytest.mark.usefixtures("quick_fits")

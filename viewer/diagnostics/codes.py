@@ -80,6 +80,16 @@ CODES: dict[str, Code] = {
     "W010": Code(
         "error", "weight refers to a nonexistent joint", "add the joint or correct the index"
     ),
+    "W011": Code("warning", "stray weights", "delete these weights and normalise"),
+    "W012": Code(
+        "warning",
+        "part moved by a distant joint",
+        "bind it to the joint that moves its neighbours",
+    ),
+    "W013": Code("warning", "joints with exchanged weights", "exchange their weights"),
+    "W014": Code("warning", "torn seams", "copy the weights of one side of the seam to the other"),
+    "W015": Code("warning", "hard weights", "smooth the weights between these joints"),
+    "W016": Code("warning", "noisy weights", "smooth the weights of these vertices"),
     # Bind matrices
     "B001": Code(
         "error", "bindings do not match the skeleton", "export skin and skeleton together"
@@ -123,6 +133,9 @@ CODES: dict[str, Code] = {
     "M012": Code("warning", "non-orientable surface", "cut it where the winding reverses"),
     "Y001": Code("warning", "asymmetric positions", "mirror one side"),
     "Y002": Code("warning", "asymmetric weights", "mirror the weights of one side"),
+    "Y003": Code("warning", "asymmetric joints", "move one of them to the mirrored position"),
+    "Y004": Code("warning", "exchanged side names", "exchange the names"),
+    "Y005": Code("warning", "asymmetric limits", "give both sides the same limits"),
     "C001": Code("warning", "keys out of time order", "sort the keys"),
     "C002": Code("warning", "duplicate key times", "keep one of them"),
     "C003": Code(
@@ -197,7 +210,6 @@ CODES: dict[str, Code] = {
     "C022": Code("warning", "bones change length", "delete the translation keys of these joints"),
     "C023": Code("warning", "joints change size", "delete the scale keys unless intended"),
     "C024": Code("warning", "hyperextended joint", "rotate the joint to its usual side"),
-    "C025": Code("warning", "hand inside the body", "move the arm outwards in these frames"),
     "G001": Code("warning", "inconsistent glTF container", "export the file again"),
     "G002": Code("warning", "inconsistent glTF mesh data", "export the file again"),
     "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),

@@ -36,6 +36,8 @@ class Check:
 
 CHECKS = {
     "weights": Check("weights"),
+    "stray_weights": Check("stray weights"),
+    "blending": Check("blending of weights"),
     "bindings": Check("bind matrices"),
     "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
     "meshes": Check("mesh"),

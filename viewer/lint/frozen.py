@@ -18,6 +18,8 @@ from viewer.rig.geometry.quaternion import angles_between
 _STILL = 0.01  # maximum step of a frozen frame, relative to that median
 _MOVING = 0.5  # minimum step beside them
 _FOR = 0.1  # seconds; a recording that was written at a higher rate repeats frames for less
+_ROUNDING = 1e-6  # maximum step, radians or relative to the size, of a body that rests
+_MOSTLY = 0.5  # minimum fraction of frames in which the body moves
 _KEYED = 0.5  # minimum fraction of these frames with keys, in a clip of keys
 _FEWEST = 3  # minimum number of frames
 
@@ -32,18 +34,19 @@ def check(subject: Subject) -> Iterator[Finding]:
         return
     turns = angles_between(track.rotations[rows[1:]], track.rotations[rows[:-1]])
     moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2) / track.size
-    # The mean of rotations and positions: a root that travels with a held pose is not frozen.
-    steps = turns.mean(axis=1) + moves.mean(axis=1)
-    steps[~(track.present[rows[1:]] & track.present[rows[:-1]])] = np.nan
-    moving = steps[steps > 0.0]
-    if len(moving) == 0:
-        return
+    known = track.present[rows[1:]] & track.present[rows[:-1]]
+    # A root that travels with a held pose is not frozen, and one that lands stops within a frame.
+    steps = np.where(known, turns.mean(axis=1), np.nan)
+    moving = steps[steps > _ROUNDING]
+    if len(moving) < _MOSTLY * len(steps):
+        return  # a body that mostly rests stops and goes on
     usual = float(np.median(moving))
+    still = (steps < _STILL * usual) & (moves.mean(axis=1) < _STILL * usual)
     step = float(track.times[rows[1]] - track.times[rows[0]])
     least = max(_FEWEST, round(_FOR / step))
     found = [
         (first, last)
-        for first, last in runs_of(steps < _STILL * usual)
+        for first, last in runs_of(still)
         if last - first >= least
         and first > 0
         and last < len(steps)

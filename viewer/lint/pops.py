@@ -28,7 +28,7 @@ _NEAR = 4  # number of steps before and after
 _AROUND = 8  # frames before and after that are compared
 _SEEN = 3  # of these, the minimum number on each side
 _ANGLE = math.radians(6.0)  # smallest rotation that is seen as a pop
-_DISTANCE = 0.03  # the same of a travelling joint, relative to its size: 60 mm for a person
+_DISTANCE = 0.04  # the same of a travelling joint, relative to its size: 70 mm for a person
 
 
 def check(subject: Subject) -> Iterator[Finding]:

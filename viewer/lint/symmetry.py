@@ -1,4 +1,4 @@
-"""Checks of left-right symmetry, for figures with a symmetry map: positions and weights."""
+"""Checks of left-right symmetry: positions, weights, joints, names and limits."""
 
 from __future__ import annotations
 
@@ -6,25 +6,50 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.lint._finding import Finding
+from viewer.lint._mirror import Mirror, mirror_of, name_partners
 from viewer.lint._subject import Subject
-from viewer.phrases import agree, counted, rounded
+from viewer.phrases import agree, counted, listed, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.retargeting.joint_names import sided_words
 from viewer.rig.retargeting.mirror import asymmetry, joint_partners
-from viewer.rig.skin import Skin, normalized, owners, row_norms
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_labels
+from viewer.rig.skin import Skin, bind_positions, normalized, owners, row_norms
 
 _MOVED = 1e-3  # minimum displacement that is reported as a note, as a fraction of the figure's size
 _ASKEW = 1e-2  # minimum visible displacement, as a fraction of the figure's size
 _SHIFTED = 0.02  # minimum total difference of a vertex's weights
 _UNEQUAL = 0.2
+# Without a map, counterparts are found by position. Sides that artists made by mirroring differ at
+# single vertices; what they painted differs everywhere.
+_APART = 0.1  # minimum difference that counts
+_EVERYWHERE = 0.25  # fraction of the vertices above which the sides differ by design
+_MOST = 0.6  # minimum fraction of a joint's vertices that differ
+_FEW_OFF = 0.4  # maximum fraction of the joints that are off: else the pose is asymmetric
+_BLENDS = 0.45  # maximum distance of a weight that blends from 0.5
+_FEWEST = 12  # minimum number of vertices of such a joint
+_UNLIKE = 0.03  # minimum distance of a joint from its counterpart's image
+_FEWER = 0.34  # maximum fraction of joints with the wrong name, or with other limits
+_SAME_LIMIT = 1e-3  # tolerance of limits, radians
+_SIDES = {"left": 1.0, "right": -1.0, "": 0.0}
 
 
 def check(subject: Subject) -> Iterator[Finding]:
-    """Compare both sides of a figure with a symmetry map."""
+    """Compare both sides of a figure, by its symmetry map or by its shape and names."""
     figure = subject.actor.figure
+    if figure.skeleton is not None:
+        yield from _limits(subject, figure.skeleton)
+    if figure.mesh is not None and figure.is_attached and not _is_incomplete(subject):
+        mirror = mirror_of(figure)
+        if mirror is not None:
+            yield from _joints(subject, figure, mirror)
+            yield from _names(subject, figure, mirror)
+            if figure.symmetry is None:
+                yield from _sides(subject, figure, mirror)
     if figure.symmetry is None or figure.mesh is None:
         return
     yield from _positions(subject, figure, figure.mesh)
@@ -102,4 +127,142 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
         np.concatenate([vertices, symmetry[vertices]]),
         np.concatenate([joints, partners[joints]]),
         np.concatenate([whole.weights, -whole.weights]),
+    )
+
+
+def _is_incomplete(subject: Subject) -> bool:
+    parts = ("positions", "weights", "bindings", "joints")
+    return any(len(subject.invalid.get(part, ())) for part in parts)
+
+
+def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:
+    """Report pairs of joints whose weights differ between the sides of a symmetric mesh."""
+    skin, skeleton = figure.require_skin(), figure.require_skeleton()
+    own = np.arange(skeleton.n_joints)
+    partners = np.where(mirror.joints >= 0, mirror.joints, own).astype(np.int32)
+    is_sided = partners != own
+    differences = np.where(
+        mirror.known, weight_differences(skin, mirror.vertices.astype(np.int32), partners), 0.0
+    )
+    off = differences > _APART
+    # Artists also paint by hand, and paint one side of clothes: what differs everywhere is meant.
+    if not off.any() or off.sum() > _EVERYWHERE * mirror.known.sum():
+        return
+    vertices = owners(skin)
+    # Where a joint blends with others: elsewhere both sides have a weight of 1.
+    counts = mirror.known[vertices] & (np.abs(skin.weights - 0.5) < _BLENDS)
+    total = np.bincount(skin.joints[counts], minlength=skeleton.n_joints)
+    changed = np.bincount(skin.joints[counts & off[vertices]], minlength=skeleton.n_joints)
+    joints = np.flatnonzero((total >= _FEWEST) & (changed > _MOST * total) & is_sided)
+    if len(joints) == 0:
+        return
+    joints = joints[np.argsort(-changed[joints] / total[joints], kind="stable")]
+    moved = np.unique(vertices[counts & off[vertices] & np.isin(skin.joints, joints)])
+    moved = moved[np.argsort(-differences[moved], kind="stable")]
+    labels = joint_labels(skeleton)
+    yield subject.found(
+        "Y002.joints: weights of {n} differ from those at the mirrored positions, most for {names} "
+        "(worst: total difference {difference} at vertex {vertex})",
+        n=counted(len(moved), "vertex"),
+        names=listed([labels[joint] for joint in joints]),
+        difference=rounded(float(differences[moved[0]])),
+        vertex=int(moved[0]),
+        vertices=moved,
+        joints=joints,
+        at=("weights", int(moved[0])),
+    )
+
+
+def _joints(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:
+    """Report joints that are not at the mirrored position of their counterpart."""
+    skin, skeleton = figure.require_skin(), figure.require_skeleton()
+    size, pairs = subject.size(), mirror.joints != np.arange(skeleton.n_joints)
+    pairs &= mirror.joints >= 0
+    # Only joints that move vertices with counterparts: tools and clothes may be on one side.
+    vertices = owners(skin)
+    weight = np.bincount(skin.joints, skin.weights, minlength=skeleton.n_joints)
+    known = np.bincount(
+        skin.joints, skin.weights * mirror.known[vertices], minlength=skeleton.n_joints
+    )
+    pairs &= (weight > 0.0) & (known > _MOST * weight)
+    off = np.flatnonzero(pairs & (mirror.errors > _UNLIKE * size))
+    if len(off) == 0 or np.median(mirror.errors[pairs]) > _ASKEW * size:
+        return
+    if len(off) > _FEW_OFF * pairs.sum():
+        return  # the skeleton is in another pose than the mesh suggests
+    # Of both joints, the one below a parent that is in its place is named.
+    off = off[np.argsort(-mirror.errors[off], kind="stable")]
+    labels = joint_labels(skeleton)
+    yield subject.found(
+        "Y003.joints: {n} not at the mirrored position of {their}: {names} (worst: {joint} by "
+        "{distance})",
+        n=counted(len(off), "joint", "is", "are"),
+        their=agree(len(off), "its counterpart", "their counterparts"),
+        names=listed([labels[joint] for joint in off]),
+        joint=labels[off[0]],
+        distance=subject.length(float(mirror.errors[off[0]])),
+        joints=off,
+        at=("bindings", int(off[0])),
+    )
+
+
+def _names(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:
+    """Report joints named after the other side than most."""
+    skeleton = figure.require_skeleton()
+    places = bind_positions(figure.require_skin())[:, mirror.axis] - mirror.centre
+    sides = np.array([_SIDES[side] for side, _ in sided_words(skeleton.names)])
+    signs = np.where(np.abs(places) > _ASKEW * subject.size(), np.sign(places), 0.0) * sides
+    usual = np.sign(signs.sum())
+    wrong = np.flatnonzero(signs * usual < 0.0)
+    if len(wrong) == 0 or len(wrong) > _FEWER * np.count_nonzero(signs):
+        return
+    labels = joint_labels(skeleton)
+    yield subject.found(
+        "Y004.names: {n} on the other side than {their} says: {names}",
+        n=counted(len(wrong), "joint", "is", "are"),
+        their=agree(len(wrong), "its name", "their names"),
+        names=listed([labels[joint] for joint in wrong]),
+        joints=wrong,
+        part="skeleton",
+        at=("joints", int(wrong[0])),
+    )
+
+
+def _limits(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
+    """Report joints whose rotation limits differ from those of their counterpart."""
+    # The axes of both sides may have opposite directions, which swaps and negates the limits, so
+    # the larger and the smaller bound of each rotation are compared by their sizes.
+    partners = name_partners(skeleton)
+    rotations: dict[tuple[int, int], tuple[float, ...]] = {}
+    for dof, (joint, kind) in enumerate(
+        zip(skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist(), strict=True)
+    ):
+        if kind >= FIRST_ROTATION:
+            rotations[joint, kind] = tuple(sorted(np.abs(skeleton.dof_limits[dof]).tolist()))
+    pairs = [
+        (joint, other)
+        for joint, other in enumerate(partners.tolist())
+        if joint < other and any(key[0] == joint for key in rotations)
+    ]
+    unlike = []
+    for joint, other in pairs:
+        mine, theirs = (
+            sorted(value for key, value in rotations.items() if key[0] == each)
+            for each in (joint, other)
+        )
+        if len(mine) != len(theirs) or not all(
+            np.allclose(a, b, atol=_SAME_LIMIT) for a, b in zip(mine, theirs, strict=True)
+        ):
+            unlike.append((joint, other))
+    if not unlike or len(unlike) > _FEWER * len(pairs):
+        return
+    labels = joint_labels(skeleton)
+    names = [Phrase("{a} and {b}", a=labels[a], b=labels[b]) for a, b in unlike]
+    yield subject.found(
+        "Y005.limits: limits of {n} differ between the sides: {names}",
+        n=counted(len(unlike), "joint pair"),
+        names=listed(names),
+        part="skeleton",
+        joints=np.unique(unlike),
+        at=("joints", unlike[0][0]),
     )

@@ -1,0 +1,238 @@
+"""Faults of weights and of symmetry in the bundled body, which has none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.lint import Finding, Subject, blending, stray_weights, symmetry
+from viewer.loading import bundled_body
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+from viewer.rig.skin import normalized, owners, skin_from_entries, skin_rows
+
+CHECKS = (stray_weights, blending, symmetry)
+
+
+@cache
+def body() -> Figure:
+    """Return the body without its symmetry map, as a file of another program has none."""
+    return replace(viewer.load(bundled_body()).actors[0].figure, symmetry=None)
+
+
+@cache
+def table() -> np.ndarray:
+    """Return the weights of the body: (V, J)."""
+    skin = normalized(body().skin)
+    weights = np.zeros((skin.n_vertices, skin.n_joints))
+    weights[owners(skin), skin.joints] = skin.weights
+    return weights
+
+
+def joint(name: str) -> int:
+    return body().skeleton.names.index(name)
+
+
+def below(name: str) -> np.ndarray:
+    """Return which joints move with a joint: (J,)."""
+    parents, found = body().skeleton.parents, np.arange(body().skeleton.n_joints) == joint(name)
+    for each in range(len(parents)):
+        found[each] |= parents[each] >= 0 and found[parents[each]]
+    return found
+
+
+def weighted(weights: np.ndarray, figure: Figure | None = None) -> Figure:
+    figure = figure or body()
+    vertices, joints = np.nonzero(weights)
+    values = weights[vertices, joints] / weights.sum(axis=1)[vertices]
+    skin = skin_from_entries(len(weights), vertices, joints, values, figure.skin.inverse_bind)
+    return replace(figure, skin=skin)
+
+
+def placed(figure: Figure, scale: float, up: str) -> Figure:
+    """Return a figure in another unit, with z up if requested."""
+    turn = np.eye(3)
+    if up == "z":
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    mesh, skin, skeleton = figure.mesh, figure.skin, figure.skeleton
+    binds = skin.inverse_bind.copy()
+    binds[:, :3, :3] = binds[:, :3, :3] @ turn.T
+    binds[:, :3, 3] *= scale
+    moved = scale * skeleton.rest_translations
+    moved[0] = moved[0] @ turn.T
+    rotations = skeleton.rest_rotations.copy()
+    if up == "z":
+        rotations[0] = np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)
+    return Figure(
+        figure.name,
+        Mesh(scale * mesh.positions @ turn.T, mesh.normals @ turn.T, mesh.triangles),
+        replace(skeleton, rest_translations=moved, rest_rotations=rotations),
+        replace(skin, inverse_bind=binds),
+        up=up,
+    )
+
+
+def linted(figure: Figure, checks: tuple[ModuleType, ...] = CHECKS) -> list[Finding]:
+    subject = Subject(Actor(figure), up=figure.up)
+    return [found for check in checks for found in check.check(subject)]
+
+
+# The head's vertex with the largest weight of the head.
+NOSE = 121
+
+
+def stray(fraction: float) -> Callable[[], Figure]:
+    def make() -> Figure:
+        weights = table().copy()
+        weights[NOSE] *= 1.0 - fraction
+        weights[NOSE, joint("right_foot")] += fraction
+        return weighted(weights)
+
+    return make
+
+
+def leak() -> Figure:
+    weights = table().copy()
+    on_head = np.flatnonzero(weights[:, joint("head")] > 0.5)
+    weights[on_head] *= 0.98
+    weights[on_head, joint("right_foot")] += 0.02
+    return weighted(weights)
+
+
+def swapped() -> Figure:
+    names = body().skeleton.names
+    legs = below("left_hip") | below("right_hip")
+    other = {"left": "right", "right": "left"}
+    partner = [
+        names.index(f"{other[name.split('_')[0]]}_{name.split('_')[1]}") if legs[k] else k
+        for k, name in enumerate(names)
+    ]
+    return weighted(table()[:, partner])
+
+
+def hard() -> Figure:
+    return weighted((table() == table().max(axis=1, keepdims=True)).astype(float))
+
+
+def hard_elbow() -> Figure:
+    weights, arm = table().copy(), [joint("left_shoulder"), joint("left_elbow")]
+    around = weights[:, arm].sum(axis=1) > 0.9
+    weights[around] = weights[around] == weights[around].max(axis=1, keepdims=True)
+    return weighted(weights)
+
+
+def noisy() -> Figure:
+    weights = table()
+    noise = np.random.default_rng(0).uniform(-0.2, 0.2, weights.shape) * (weights > 0.02)
+    return weighted(np.clip(weights + noise, 0.0, 1.0))
+
+
+def lopsided() -> Figure:
+    weights, wrist = table().copy(), below("left_elbow")
+    arm = weights[:, wrist].sum(axis=1) > 0.3
+    weights[arm, joint("left_shoulder")] += 0.3
+    return weighted(weights)
+
+
+def moved(*changes: tuple[str, list[float]]) -> Figure:
+    """Return the body with moved joints, whose bindings follow."""
+    figure = body()
+    binds, skeleton = figure.skin.inverse_bind.copy(), figure.skeleton
+    offsets = skeleton.rest_translations.copy()
+    for name, by in changes:
+        binds[joint(name), :3, 3] -= by
+        offsets[joint(name)] += by
+        offsets[skeleton.parents == joint(name)] -= by
+    skeleton = replace(skeleton, rest_translations=offsets)
+    return replace(figure, skeleton=skeleton, skin=replace(figure.skin, inverse_bind=binds))
+
+
+def renamed() -> Figure:
+    swap = {"left_knee": "right_knee", "right_knee": "left_knee"}
+    skeleton = body().skeleton
+    names = tuple(swap.get(name, name) for name in skeleton.names)
+    return replace(body(), skeleton=replace(skeleton, names=names))
+
+
+def limited() -> Figure:
+    skeleton = body().skeleton
+    limits = skeleton.dof_limits.copy()
+    limits[skeleton.dof_joints == joint("left_knee")] = [-0.5, 1.5]
+    return replace(body(), skeleton=replace(skeleton, dof_limits=limits))
+
+
+LEG = ("hip", "knee", "ankle", "foot")
+FAULTS = {
+    "stray vertex": (stray(1.0), "W011.strays", ["right_foot"], [NOSE]),
+    "30 % stray": (stray(0.3), "W011.strays", ["right_foot"], [NOSE]),
+    "leak": (leak, "W011.strays", ["right_foot"], "head"),
+    "legs swapped": (
+        swapped, "W013.swapped", [f"{s}_{j}" for s in ("left", "right") for j in LEG], []
+    ),
+    "hard everywhere": (hard, "W015.everywhere", [], None),
+    "hard elbow": (hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None),
+    "noise": (noisy, "W016.noise", None, None),
+    "one arm differs": (lopsided, "Y002.joints", None, None),
+    "one elbow moved": (
+        lambda: moved(("left_elbow", [0.0, 0.1, 0.0])), "Y003.joints",
+        ["left_elbow", "right_elbow"], [],
+    ),
+    "names swapped": (renamed, "Y004.names", ["left_knee", "right_knee"], []),
+    "limits of one knee": (limited, "Y005.limits", ["left_knee", "right_knee"], []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_fault_is_found_at_its_joints_and_vertices(name):
+    make, key, joints, vertices = FAULTS[name]
+    (found,) = [one for one in linted(make()) if one.diagnostic.key == key]
+    assert found.severity == "warning"
+    if joints is not None:
+        names = body().skeleton.names
+        assert sorted(names[each] for each in found.joints) == sorted(joints)
+    if vertices == "head":
+        vertices = np.flatnonzero(table()[:, joint("head")] > 0.5).tolist()
+    assert vertices is None or sorted(found.vertices.tolist()) == vertices
+
+
+@pytest.mark.parametrize(("scale", "up"), [(100.0, "y"), (0.01, "z")])
+def test_body_has_no_finding_in_any_unit(scale, up):
+    figure = placed(body(), scale, up)
+    assert linted(figure) == []
+    again = linted(placed(stray(0.3)(), scale, up))
+    assert [one.diagnostic.key for one in again] == ["W011.strays"]
+
+
+def apart(figure: Figure, vertices: np.ndarray) -> tuple[Figure, np.ndarray]:
+    """Return a figure whose triangles around some vertices use copies of them, and the copies."""
+    mesh, count = figure.mesh, figure.mesh.n_vertices
+    copies = count + np.arange(len(vertices))
+    triangles = mesh.triangles.copy()
+    number = np.arange(count)
+    number[vertices] = copies
+    above = mesh.positions[triangles].mean(axis=1)[:, 1] > mesh.positions[vertices, 1].mean()
+    triangles[above] = number[triangles[above]]
+    every = np.concatenate([np.arange(count), vertices])
+    split = Mesh(mesh.positions[every], mesh.normals[every], triangles)
+    skin = skin_rows(figure.skin, every)
+    return Figure(figure.name, split, figure.skeleton, skin), copies
+
+
+def test_seam_with_other_weights_on_one_side_is_torn():
+    """The triangles above a height have vertices of their own; some of these keep their weights."""
+    ring = np.flatnonzero(np.abs(body().mesh.positions[:, 1] - 0.2) < 0.1)
+    split, copies = apart(body(), ring)
+    assert linted(split, (blending,)) == []
+    weights = np.concatenate([table(), table()[ring]])
+    torn = copies[np.isin(copies, split.mesh.triangles)][::9]
+    weights[torn] = 0.7 * weights[torn]
+    weights[torn, joint("pelvis")] += 0.3
+    found = [one for one in linted(weighted(weights, split)) if one.code == "W014"]
+    (one,) = found
+    changed = torn[1.0 - weights[torn, joint("pelvis")] > 0.0]
+    assert set(one.vertices.tolist()) <= set(changed.tolist()) and len(one.vertices)
