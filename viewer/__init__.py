@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from viewer.export import export
     from viewer.formats import write
     from viewer.loading import load
+    from viewer.loading.own_arrays import animate, figure
     from viewer.rendering.camera import Camera
     from viewer.rendering.offscreen import render
     from viewer.rendering.options import DisplayOptions, Light, Lights
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from viewer.rig.figure import Figure
     from viewer.rig.material import Material, Texture
     from viewer.rig.mesh import Mesh
+    from viewer.rig.motion.actor_arrays import at, joints, vertices
     from viewer.rig.motion.clip import Channel, Clip, evaluate, sample
     from viewer.rig.motion.motion_arrays import MotionArrays, motion
     from viewer.rig.motion.onion import onion
@@ -67,13 +69,17 @@ __all__ = [
     "Skinning",
     "Texture",
     "ViewerError",
+    "animate",
     "apply_record",
+    "at",
     "batch",
     "deform",
     "deform_frames",
     "evaluate",
     "export",
+    "figure",
     "joint_matrices",
+    "joints",
     "load",
     "mirror_pose",
     "motion",
@@ -84,6 +90,7 @@ __all__ = [
     "sample",
     "shaped",
     "show",
+    "vertices",
     "with_rest_mesh",
     "write",
 ]
@@ -110,13 +117,17 @@ _HOMES = {
     "Skinning": "rig.skinning",
     "Texture": "rig.material",
     "ViewerError": "errors",
+    "animate": "loading.own_arrays",
     "apply_record": "rig.posing.pose_record",
+    "at": "rig.motion.actor_arrays",
     "batch": "commands._batch.calling",
     "deform": "rig.skinning",
     "deform_frames": "rig.skinning",
     "evaluate": "rig.motion.clip",
     "export": "export",
+    "figure": "loading.own_arrays",
     "joint_matrices": "rig.skinning",
+    "joints": "rig.motion.actor_arrays",
     "load": "loading",
     "mirror_pose": "rig.retargeting.mirror",
     "motion": "rig.motion.motion_arrays",
@@ -127,6 +138,7 @@ _HOMES = {
     "sample": "rig.motion.clip",
     "shaped": "rig.shape",
     "show": "app.window",
+    "vertices": "rig.motion.actor_arrays",
     "with_rest_mesh": "rig.shape",
     "write": "formats",
 }
@@ -136,7 +148,12 @@ def __getattr__(name: str) -> "Any":
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
+    from sys import modules
 
+    if "IPython" in modules:
+        from viewer.notebook import show_pictures
+
+        show_pictures()
     value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value

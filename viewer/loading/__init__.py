@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.formats import MAX_SIZE
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.contents import Contents, read_files, read_source
 from viewer.loading.settings import MotionSettings
-from viewer.models import bundled_body, bundled_files
+from viewer.models import bundled_body, bundled_files, named_files
 from viewer.rig.scene import Scene
 
 __all__ = [
@@ -25,7 +26,11 @@ __all__ = [
 
 
 def load(
-    *paths: str | Path, max_size: int = MAX_SIZE, motion: MotionSettings | None = None
+    *paths: str | Path,
+    model: str | Path | None = None,
+    gender: str = "",
+    max_size: int = MAX_SIZE,
+    motion: MotionSettings | None = None,
 ) -> Scene:
     """Open files as one scene; without files, the bundled figure.
 
@@ -44,11 +49,16 @@ def load(
     *paths : str or Path
         ``.skel``, ``.skin``, ``.anim``, ``.bvh``, ``.glb``, ``.gltf``, ``.vrm``, ``.vrma``,
         ``.fbx``, body models, PIG folders, AMASS files, EasyMocap folders, poses and images, in
-        any order.
+        any order; names of models, as on the command line: ``"body"``, ``"fox"``, ``"anny"``,
+        ``"smplx:neutral"``.
+    model : str or Path, optional
+        Body model for captured bodies, or figure that a BVH file drives: a file or a name.
+    gender : str
+        Gender of the body model, if it is not that of the files.
     max_size : int
         Larger files, in bytes, are rejected before they are read.
     motion : MotionSettings, optional
-        How motions are interpreted: model, frame rate, up axis, unit.
+        How motions are interpreted: frame rate, up axis, unit and others.
 
     Returns
     -------
@@ -66,4 +76,8 @@ def load(
     >>> scene.actors[0].figure.name
     'fox'
     """
-    return assemble(read_files(paths or bundled_files(), max_size, motion), motion)
+    settings = motion or MotionSettings()
+    if model is not None or gender:
+        settings = replace(settings, model=model or settings.model, gender=gender)
+    named = [path for each in paths for path in named_files(each)]
+    return assemble(read_files(named or bundled_files(), max_size, settings), settings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
@@ -12,6 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure, skeleton_points
@@ -36,6 +37,9 @@ Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 
 Shown: TypeAlias = Literal["skin", "skeleton", "both", "binding"]
 """Parts of a figure that are drawn; ``"binding"`` is the skin in the bind pose."""
+
+# Descriptions of actors and scenes: characters of a name, and actors that are shown.
+_LONGEST, _MOST_SHOWN = 60, 3
 
 # Fraction of outlying points that the camera ignores if they enlarge the bounding box a lot.
 _OUTLIER_FRACTION = 0.001
@@ -160,6 +164,47 @@ class Actor:
             raise RigError(f"{self.name} has no motion")
         return self.clip
 
+    def __repr__(self) -> str:
+        figure, clip, parts = self.figure, self.clip, list[str]()
+        if self.shape_space.title:
+            parts.append(self.shape_space.title)
+        if figure.mesh is not None:
+            parts.append(counted(figure.mesh.n_vertices, "vertex"))
+        if figure.skeleton is not None:
+            parts.append(counted(figure.skeleton.n_joints, "joint"))
+        if figure.points is not None:
+            parts.append(counted(len(figure.points.names), "point"))
+        if clip is not None and clip.timing is not None:
+            frames = counted(clip.timing.n_frames, "frame")
+            parts.append(f"{frames} at {clip.timing.frame_rate:g} fps")
+        elif clip is not None:
+            parts.append(f"{clip.end - clip.start:.3g} s of keys")
+        return f"<Actor {printable(self.name, _LONGEST)}: {', '.join(parts)}>"
+
+    def __getitem__(self, joint: str) -> Floats:
+        """Return a joint's rotation relative to its parent as a rotation vector, radians: (3,)."""
+        from viewer.rig.geometry.rotation import matrix_to_rotation_vector
+        from viewer.rig.pose import joint_rotations
+        from viewer.rig.skeleton import find_joint
+
+        skeleton = self.figure.require_skeleton()
+        turned = joint_rotations(skeleton, self.require_pose())
+        return matrix_to_rotation_vector(turned[find_joint(skeleton, joint)])
+
+    def __setitem__(self, joint: str, rotation: Floats | Sequence[float]) -> None:
+        """Rotate a joint relative to its parent by a rotation vector, radians: (3,)."""
+        from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+        from viewer.rig.posing.pose_vector import set_joint_rotations
+        from viewer.rig.skeleton import find_joint
+
+        skeleton = self.figure.require_skeleton()
+        vector = np.asarray(rotation, dtype=np.float64)
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation}")
+        joints = np.array([find_joint(skeleton, joint)], dtype=np.int32)
+        turned = rotation_vector_to_matrix(vector)[None]
+        set_joint_rotations(skeleton, self.require_pose(), joints, turned, "quaternion")
+
     def copy(self) -> Actor:
         """Return a copy that is posed and placed independently; figure and clip are shared."""
         return replace(
@@ -213,6 +258,35 @@ class Scene:
     in_space: Callable[[str], Scene] | None = None
     """Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
     None if there is only one space."""
+
+    def __repr__(self) -> str:
+        count, found = len(self.actors), len(self.diagnostics)
+        beside = f", {counted(found, 'finding')} in .diagnostics" if found else ""
+        lines = [f"<Scene of {counted(count, 'actor')}{beside}>"]
+        lines += [f"  {actor!r}" for actor in self.actors[:_MOST_SHOWN]]
+        if count > _MOST_SHOWN:
+            lines.append(f"  and {count - _MOST_SHOWN} more")
+        return "\n".join(lines)
+
+    def __len__(self) -> int:
+        return len(self.actors)
+
+    def __iter__(self) -> Iterator[Actor]:
+        return iter(self.actors)
+
+    def __getitem__(self, which: int | str) -> Actor:
+        """Return an actor by its index or name; ``RigError`` if there is none."""
+        if isinstance(which, str):
+            from viewer.near_names import name_hint
+
+            named = [actor for actor in self.actors if which in (actor.name, actor.title)]
+            if not named:
+                names = [actor.name for actor in self.actors]
+                raise RigError(f'no actor "{which}"; {name_hint(which, names)}')
+            return named[0]
+        if not -len(self.actors) <= which < len(self.actors):
+            raise RigError(f"no actor {which}: the scene has {len(self.actors)}")
+        return self.actors[which]
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -195,7 +195,7 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
     """Write figures placed as in their scene, with one animation that moves them all."""
     parts = [part for part in selection.parts if part.frames is not None]
     others = [part.actor for part in selection.parts if part.frames is None]
-    scene = selection.scene or Scene(selection.actors)
+    scene = Scene(list(selection.actors)) if selection.scene is None else selection.scene
     document, actors = Document(path.stem), [*(part.actor for part in parts), *others]
     found = [
         sampled_of(each.animation, replace(options, world_up=each.up), each.actor.color)
