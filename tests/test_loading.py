@@ -131,7 +131,8 @@ def test_skin_without_weights_is_refused_with_a_skeleton(files, tmp_path):
     bare = tmp_path / "bare.skin"
     bare.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
     assert refusal(skel, bare) == (
-        f"{bare}: expected weights and bindings for the 2 joints of {skel}, found none"
+        f"{bare}: expected weights and bindings for the 2 joints of {skel}, found none; viewer rig "
+        "--skeleton computes them"
     )
     assert viewer.load(bare).warnings == (
         f"{bare}: no `skinweights` or `bindings`: the mesh cannot be skinned",

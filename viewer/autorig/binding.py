@@ -62,6 +62,7 @@ _UNITS = (1.0, *sorted({a / b for a, b in product(METRES.values(), repeat=2) if 
 # Fraction of joints inside that a place needs if the skeleton may also slide, and the difference
 # from the best up to which places are alike.
 _SLID, _ALIKE = 0.85, 0.1
+_TELLING = 0.5  # fraction of joints with weights from which the others are known to be idle
 # Networks that predict skeletons scale the longest side of a mesh to 2, centred, or to 1.
 _NORMALISED = (2.0, 1.0)
 _ROUNDING = 1e-9
@@ -142,13 +143,16 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
 
 
 def _deforming(source: Figure) -> Bools | None:
-    """Return the joints (J,) with weights in the skeleton's own figure; None if it has no skin."""
+    """Return the joints (J,) with weights in the skeleton's own figure; None if that says little.
+
+    Files of a predicted skeleton may have a mesh that is bound to a few of its joints only.
+    """
     if not source.is_rigged:
         return None
     idle = idle_joints(source.require_skin(), source.skeleton)
     found = np.ones(source.require_skeleton().n_joints, dtype=np.bool_)
     found[idle] = False
-    return found
+    return found if found.mean() >= _TELLING else None
 
 
 def _asked(source: Figure, skeleton: Skeleton) -> Bools:
@@ -176,6 +180,8 @@ def _placed(
     elif pairs is not None:
         given = fit_similarity(pairs[:, 0], pairs[:, 1], scale)
     if given is not None:
+        if not given.is_plain:
+            raise RigError("alignment: expected one scale for a skeleton, found one for each axis")
         inside = _counts_inside(solid, points, [given])[0]
         if inside == 0:
             raise _misplaced(source, 0, len(points), given.scale * _ratio(points, solid))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from viewer.errors import FormatError, RigError
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted
 from viewer.rig.figure import Figure
 
 
@@ -58,10 +58,15 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
     assert skeleton is not None  # the first figure of a pair is the skeleton
     if skin is None:
         raise FormatError.fault(
-            "F004.skin: expected weights and bindings for the {n} joints of {skeleton}, found none",
+            "F004.skin: expected weights and bindings for the {n} joints of {skeleton}, found "
+            "none; {remedy}",
             paths[1],
             n=skeleton.n_joints,
             skeleton=paths[0],
+            remedy=Remedy(
+                "Window > Rig binds the mesh to the skeleton, as its template file",
+                "viewer rig --skeleton computes them",
+            ),
         )
     if skin.n_joints != skeleton.n_joints:
         raise RigError.fault(

@@ -9,6 +9,7 @@ from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.test_panel_pictures import _compare, _shown
 from app.tiny import write_rig
+from autorig.rigged_shapes import arm
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
@@ -18,8 +19,11 @@ from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
+from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.motion.clip import sample
+from viewer.rig.pose import rest_pose
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
@@ -276,6 +280,31 @@ def test_both_methods_are_compared(rigging, texts):
     for expected in ("scan", "scan rigged", "scan rigged (nearest)"):
         hand.click(f"version {['target', 'robust', 'nearest'][names_of(expected)]}")
         assert sorted(visible(hand)) == ["arm", expected]
+
+
+def test_mesh_is_bound_to_a_skeleton_of_the_scene(drive, texts):
+    figure = arm()
+    mesh, bare = Figure("scan", figure.mesh), Figure("joints", skeleton=figure.skeleton)
+    hand = drive(scene=Scene([Actor(mesh), Actor(bare, rest_pose(bare.skeleton))]), size=SIZE,
+                 samples=1)  # fmt: skip
+    hand.menu("menu Window", "Rig")
+    texts.clear()
+    hand.step(2)
+    assert "2 joints, no mesh, in its current pose" in texts
+    for label in ("Align", "Show match", "rig tool move"):
+        hand.click(label)
+    assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
+    hand.click("Compare methods")
+    hand.finish_job()
+    assert names(hand) == ["scan bound", "joints", "scan", "scan bound (voxel)"]
+    results = hand.state.of(Rigging).results
+    assert list(results) == ["heat", "voxel"] and hand.state.of(Rigging).comparison is not None
+    line = str(results["heat"].rigged.lines[0])
+    assert line == "skeleton: used where it is, 1 of 1 joint inside the mesh"
+    for actor in (result.actor for result in results.values()):
+        assert actor.figure.skeleton is bare.skeleton
+        assert_allclose(deform(actor.figure, rest_pose(bare.skeleton))[0], mesh.mesh.positions,
+                        atol=1e-12)  # fmt: skip
 
 
 def names_of(expected):

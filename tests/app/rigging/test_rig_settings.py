@@ -190,13 +190,14 @@ def test_template_from_a_file_is_unchanged_by_fitting(drive, tmp_path):
 def test_unsuitable_files_show_a_message(rigging, tmp_path):
     hand = rigging()
     skel, skin = write_rig(tmp_path)
+    (tmp_path / "bare.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     hand.click("Template file…")
     hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
-    hand.click("file tiny.skel")
+    hand.click("file bare.obj")
     hand.click("Open###Open")
     hand.finish_job()
-    wanted = "tiny.skel: expected a figure with mesh, skeleton and skin, found none"
+    wanted = "bare.obj: expected a rigged figure or a skeleton, found none"
     assert hand.state.error == wanted
     hand.key("escape")
     hand.click("Template file…")

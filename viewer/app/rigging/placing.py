@@ -140,7 +140,7 @@ def set_aside(state: AppState) -> None:
 def ghost_of(state: AppState) -> Ghost | None:
     """Return the template to be drawn over the scene; None if it is hidden."""
     view, template = state.of(Rigging), aligned_template(state)
-    if template is None or view.target is None:
+    if template is None or view.target is None or not template.figure.is_attached:
         return None
     style: Literal[""] | GhostStyle = ""
     if view.tool == "landmarks":

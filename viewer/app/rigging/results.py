@@ -371,7 +371,7 @@ def _draw_table(state: AppState) -> None:
     _table_row("", "", [one.method for one in found])
     _table_row(
         "matched",
-        "vertices whose weights come from the closest points of the template",
+        "vertices whose weights come from the closest points of the template, or from a bone",
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _table_row(

@@ -45,7 +45,10 @@ from viewer.app.rigging.rigging import (
     Template,
     choose_target,
     choose_template,
+    compared_methods,
     current_template,
+    method_now,
+    no_placing,
     no_target,
     refresh,
     target_mesh,
@@ -63,7 +66,7 @@ from viewer.app.rigging.work import (
 )
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignedBy, Alignment, AlignmentSettings
-from viewer.autorig.settings import METHODS
+from viewer.autorig.settings import METHODS, TransferMethod
 from viewer.errors import ViewerError
 from viewer.formats import MESHES
 from viewer.loading.placing import placed_like
@@ -75,7 +78,11 @@ from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title
 
 _MOST_ITERATIONS, _MOST_INFLUENCES = 50, 16
-_NEAREST_WHY = 'the method "nearest" has no such option'
+_ONLY: dict[str, tuple[TransferMethod, ...]] = {
+    "smoothing": ("robust", "heat", "voxel"),
+    "max_influences": ("robust", "heat", "voxel"),
+}
+"""Methods with an option; all other options are those of the first."""
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
 _GAP = 1.2  # distance of the template from other actors, relative to its width
 _FEWEST = 3  # minimum number of landmarks
@@ -104,11 +111,12 @@ def draw(state: AppState) -> None:
     why = no_target(state)
     if why:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
-    with disabled(state, why):
+    with disabled(state, why or no_placing(state)):
         if _section("Align", "align the template with the target"):
             _draw_alignment(state)
         if _section("Match", "conditions for using the template's weights unchanged"):
             _draw_match(state)
+    with disabled(state, why):
         if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)
     if not rigging.results:
@@ -147,8 +155,11 @@ def _draw_sources(state: AppState) -> None:
     if key != view.template_key:
         choose_template(state, key)
     if button(state, "Template file…", why):
-        ask_for_files(state, start_reading, "Template: any rigged figure")
-    explain("any figure that can be opened: a body model, .npz, or .skel and .skin together")
+        ask_for_files(state, start_reading, "Template: any rigged figure, or a skeleton")
+    explain(
+        "any figure that can be opened: a body model, .npz, or .skel and .skin together; or a "
+        "skeleton to which the target is bound"
+    )
     template = current_template(state)
     # A template that has not been read yet has the same controls, so that buttons do not move.
     if template is None or template.actor is None:
@@ -164,9 +175,10 @@ def _draw_sources(state: AppState) -> None:
     text = "read on first use"
     if template is not None:
         n_joints = template.figure.require_skeleton().n_joints
-        n_vertices = template.figure.require_mesh().n_vertices
+        mesh = template.figure.mesh
+        size = "no mesh" if mesh is None else f"{mesh.n_vertices:,} vertices"
         pose = "in its current pose" if template.actor is not None else "in its file's pose"
-        text = f"{n_joints} joints, {n_vertices:,} vertices, {pose}"
+        text = f"{n_joints} joints, {size}, {pose}"
     imgui.text_disabled(text)
     imgui.pop_text_wrap_pos()
 
@@ -194,7 +206,7 @@ def _draw_match(state: AppState) -> None:
     """Draw the conditions for a match, and the fraction of vertices that match."""
     view = state.of(Rigging)
     choices = view.choices
-    why = _NEAREST_WHY if choices.method == "nearest" else ""
+    why = _unused(state, "max_distance")
     with disabled(state, why):
         percent = 100.0 * choices.max_distance
         moved = slider(state, "Max. distance", percent, 0.1, 30.0, "%.1f %%")
@@ -220,17 +232,22 @@ def _draw_match(state: AppState) -> None:
 def _draw_run(state: AppState) -> None:
     """Draw the settings of the transfer, and the buttons that start it."""
     choices = state.of(Rigging).choices
-    draw_setting(state, "Method", choices, "method")
-    explain(METHODS[choices.method])
+    method, template = method_now(state), current_template(state)
+    known = METHODS if template is None else template.methods
+    chosen = choice(state, "Method", method, {name: name for name in known})
+    explain(METHODS[method])
+    if chosen != method:
+        choices.method = method = chosen
     _draw_advanced(state, choices)
     why = no_job_room(state)
     if button(state, "Run", why):
-        start_run(state, (choices.method,))
+        start_run(state, (method,))
     explain("rig the target; aligns the template first if necessary")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
-        start_run(state, tuple(METHODS))
-    explain("run both methods; A cycles through the original mesh and both results")
+        start_run(state, compared_methods(method))
+    both = " and ".join(compared_methods(method))
+    explain(f"run {both}; A cycles through the original mesh and both results")
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
@@ -242,12 +259,14 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
     note_item(state, "rig advanced")
     if not opened:
         return
-    why = _NEAREST_WHY if choices.method == "nearest" else ""
+    why = _unused(state, "joints")
     with disabled(state, why):
         text = "refine the result of the search or of the landmarks by closest points"
         draw_setting(state, "Refine alignment", choices, "refines", text, why)
         text = "surface: joints are placed by the surface around them; alignment: only by the "
         draw_setting(state, "Joints##rig", choices, "joints", f"{text}alignment", why)
+    why = _unused(state, "smoothing")
+    with disabled(state, why):
         limits = (0, _MOST_ITERATIONS)
         count = count_slider(state, "Smoothing", choices.smoothing, limits)
         explain("smoothing iterations for inpainted weights", why)
@@ -257,9 +276,19 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
         most = count_slider(state, "Max. influences", choices.max_influences, limits, text)
         explain("number of influences to keep per vertex, largest first; 0 keeps all", why)
         choices.max_influences = max(most, 0)
+    why = _unused(state, "correctives")
+    with disabled(state, why):
         text = "transfer the template's pose correctives, if any"
         draw_setting(state, "Pose correctives", choices, "correctives", text, why)
     imgui.tree_pop()
+
+
+def _unused(state: AppState, option: str) -> str:
+    """Return the reason why the chosen method does not use an option."""
+    method = method_now(state)
+    if method in _ONLY.get(option, ("robust",)):
+        return ""
+    return f'the method "{method}" has no such option'
 
 
 def _draw_alignment(state: AppState) -> None:

@@ -16,7 +16,14 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings, TemplateScale
 from viewer.autorig.correspondence import MAX_ANGLE
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import JOINTS, METHODS, JointPlaces, TransferMethod, TransferSettings
+from viewer.autorig.settings import (
+    BINDING,
+    JOINTS,
+    METHODS,
+    JointPlaces,
+    TransferMethod,
+    TransferSettings,
+)
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
@@ -60,12 +67,12 @@ _posed: Memo[Skin, Mesh] = Memo()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """A rigged figure whose rig is transferred."""
+    """A rigged figure whose rig is transferred, or a skeleton to which the target is bound."""
 
     key: str
     """Key in the list of templates."""
     figure: Figure
-    """Figure with mesh, skeleton and skin."""
+    """Figure with mesh, skeleton and skin, or with a skeleton only."""
     pose: Pose
     """Pose of the figure; for an actor of the scene, its current pose."""
     clip: Motion | None = None
@@ -74,6 +81,11 @@ class Template:
     """Actor of the scene; None if the template was read from files."""
     paths: tuple[Path, ...] = ()
     """The files of the template; empty for an actor."""
+
+    @property
+    def methods(self) -> tuple[TransferMethod, ...]:
+        """Methods that it can be used with."""
+        return tuple(METHODS) if self.figure.is_attached else BINDING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,9 +241,17 @@ def targets(state: AppState) -> list[Actor]:
 
 
 def templates(state: AppState) -> list[Actor]:
-    """Return the actors of the scene that are already rigged."""
+    """Return the actors of the scene that are already rigged, or that are skeletons only."""
     made = {id(result.actor) for result in state.of(Rigging).results.values()}
-    return [a for a in state.scene.actors if a.figure.is_rigged and id(a) not in made]
+    return [
+        actor
+        for actor in state.scene.actors
+        if (actor.figure.is_rigged or _is_skeleton(actor.figure)) and id(actor) not in made
+    ]
+
+
+def _is_skeleton(figure: Figure) -> bool:
+    return figure.mesh is None and figure.skeleton is not None and figure.points is None
 
 
 def refresh(state: AppState) -> None:
@@ -302,6 +322,27 @@ def current_template(state: AppState) -> Template | None:
     return read if read is not None and read.key == view.template_key else None
 
 
+def method_now(state: AppState) -> TransferMethod:
+    """Return the chosen method, or the first one that can use the chosen template."""
+    chosen, template = state.of(Rigging).choices.method, current_template(state)
+    if template is None or chosen in template.methods:
+        return chosen
+    return template.methods[0]
+
+
+def compared_methods(method: TransferMethod) -> tuple[TransferMethod, ...]:
+    """Return the methods that are compared with a chosen one: those of the same kind."""
+    return BINDING if method in BINDING else tuple(name for name in METHODS if name not in BINDING)
+
+
+def no_placing(state: AppState) -> str:
+    """Return the reason why the template cannot be aligned with the target."""
+    template = current_template(state)
+    if template is None or template.figure.is_attached:
+        return ""
+    return "a skeleton without a mesh is used where it is, or where it fits inside the target"
+
+
 def template_files(key: str) -> tuple[Path, ...]:
     """Return the files of a bundled template."""
     return (bundled_body(),) if key == "body" else bundled_files()
@@ -310,12 +351,13 @@ def template_files(key: str) -> tuple[Path, ...]:
 def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
     """Read a template; ``ViewerError`` if a file cannot be read, or contains no rigged mesh."""
     scene = load(*paths)
-    attached = [actor for actor in scene.actors if actor.figure.is_attached]
-    if not attached:
+    found = [actor for actor in scene.actors if actor.figure.is_attached]
+    found = found or [actor for actor in scene.actors if _is_skeleton(actor.figure)]
+    if not found:
         names = ", ".join(printable(path.name, 60) for path in paths)
-        raise RigError(f"{names}: expected a figure with mesh, skeleton and skin, found none")
-    actor = attached[0]
-    assert actor.pose is not None  # rigged actors have poses
+        raise RigError(f"{names}: expected a rigged figure or a skeleton, found none")
+    actor = found[0]
+    assert actor.pose is not None  # actors with skeletons have poses
     return Template(key, actor.figure, actor.pose, actor.clip, None, paths)
 
 

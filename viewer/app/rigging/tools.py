@@ -36,6 +36,7 @@ from viewer.app.rigging.rigging import (
     Rigging,
     RigTool,
     Template,
+    no_placing,
     refresh,
     target_mesh,
 )
@@ -64,6 +65,9 @@ _INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 def choose_rig_tool(state: AppState, tool: RigTool) -> None:
     """Choose a tool to move the template."""
     view = state.of(Rigging)
+    if tool and no_placing(state):
+        state.say_status(no_placing(state))
+        return
     if tool and aligned_template(state) is None:
         start_reading(state)
         return

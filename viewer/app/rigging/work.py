@@ -36,7 +36,7 @@ from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import METHODS, TransferMethod, TransferSettings
+from viewer.autorig.settings import TransferMethod, TransferSettings
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
@@ -54,7 +54,13 @@ from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 
 _Finish = Callable[[AppState], None]
-_CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
+_CALLED: dict[TransferMethod, str] = {
+    "robust": "rigged",
+    "nearest": "rigged (nearest)",
+    "heat": "bound",
+    "voxel": "bound (voxel)",
+}
+"""Words that are appended to the mesh's name."""
 
 
 def _begin(state: AppState, title: str, act: Callable[[], _Finish], output: str = "") -> None:
@@ -270,7 +276,7 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
         def finish(state: AppState) -> None:
             _keep(state, template)
             state.of(Rigging).placing = found
-            both = compare(*results) if len(results) == len(METHODS) else None
+            both = compare(*results) if len(results) == 2 else None
             put_results(state, results, both)
 
         return finish
