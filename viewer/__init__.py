@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from viewer.app.window import show
     from viewer.batching.report import Report
     from viewer.commands._batch.calling import batch
+    from viewer.commands._picture import render
     from viewer.errors import ViewerError
     from viewer.export import export
     from viewer.formats import write
     from viewer.loading import load
     from viewer.loading.own_arrays import animate, figure
     from viewer.rendering.camera import Camera
-    from viewer.rendering.offscreen import render
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rig.blendshapes import BlendShapes
     from viewer.rig.figure import Figure
@@ -133,7 +133,7 @@ _HOMES = {
     "motion": "rig.motion.motion_arrays",
     "onion": "rig.motion.onion",
     "record_of": "rig.posing.pose_record",
-    "render": "rendering.offscreen",
+    "render": "commands._picture",
     "rest_pose": "rig.pose",
     "sample": "rig.motion.clip",
     "shaped": "rig.shape",

@@ -134,38 +134,7 @@ def render(
     camera: Camera | None = None,
     options: DisplayOptions | None = None,
 ) -> Bytes:
-    """Draw a scene without a window.
-
-    The context is created on first use and cached, one per thread; use ``Offscreen`` to manage it.
-    Afterwards no context is current in this thread.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene, with its actors in their current poses.
-    size : (int, int)
-        Width and height in pixels.
-    camera : Camera, optional
-        Camera; by default, one that frames the scene.
-    options : DisplayOptions, optional
-        Display options; shadows are drawn (quality normal) if omitted.
-
-    Returns
-    -------
-    (H, W, 4) uint8
-        sRGB and alpha, first row at the top.
-
-    Raises
-    ------
-    ViewerError
-        If the driver cannot draw an image of this size.
-    RenderError
-        If there is no usable OpenGL.
-
-    >>> import viewer
-    >>> viewer.render(viewer.load(), size=(64, 48)).shape
-    (48, 64, 4)
-    """
+    """Draw a scene with this thread's context: (H, W, 4) uint8; see ``viewer.render``."""
     with deferred():
         if not hasattr(_thread, "kept"):
             _thread.kept = _OfThread()

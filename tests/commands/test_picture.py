@@ -1,0 +1,69 @@
+"""``viewer.render`` with the settings of the command."""
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.cli import run
+from viewer.errors import RigError, ViewerError
+from viewer.formats import Source
+from viewer.formats._references import read_picture
+
+SIZE = (120, 90)
+
+
+def test_settings_draw_what_the_command_draws(tmp_path):
+    words = ["--look-at", "head", "--distance", "60", "--scalar", "weight:head", "--azimuth", "20"]
+    words += ["--background", "white", "--quality", "normal", "--size", "120x90"]
+    assert run(["render", "-o", str(tmp_path / "fox.png"), *words]) == 0
+    settings = {"look_at": "head", "distance": 60, "scalar": "weight:head", "azimuth": 20}
+    found = viewer.render(viewer.load(), SIZE, **settings, background="white", quality="normal")
+    np.testing.assert_array_equal(found, read_picture(Source.open(tmp_path / "fox.png")))
+
+
+def test_time_poses_a_copy():
+    turns = np.zeros((2, 2, 3))
+    turns[1, 1, 2] = np.pi / 2
+    square = [[0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 0]]
+    figure = viewer.figure(
+        square,
+        [[0, 1, 2, 3]],
+        weights=[[1, 0], [1, 0], [0, 1], [0, 1]],
+        joints=[[0, 0, 0], [0, 1, 0]],
+    )
+    actor = viewer.animate(figure, turns, fps=1)
+    camera = viewer.Camera(distance=8.0, azimuth=0.0, inclination=0.0)
+    later = viewer.render(actor, SIZE, camera, time=1.0)
+    assert actor["joint_1"].tolist() == [0, 0, 0]
+    np.testing.assert_array_equal(later, viewer.render(viewer.at(actor, 1.0), SIZE, camera))
+    assert (later != viewer.render(actor, SIZE, camera)).any()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"options": viewer.DisplayOptions(shading="nonsense")}, "^shading: no value .*phong, pbr"),
+        ({"quality": "best"}, '^quality: no value "best"; there are 3: draft, normal, final'),
+        ({"background": "blue"}, '^background: expected "gradient"'),
+        ({"scalar": "weight:nobody"}, '^weight:nobody: no joint is called "nobody"'),
+        ({"distance": -1}, "^distance: expected more than 0, found -1"),
+        ({"camera": viewer.Camera(), "azimuth": 3}, "^camera: expected it or settings of the view"),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_values_that_do_not_exist_are_named(settings, message):
+    with pytest.raises(ViewerError, match=message):
+        viewer.render(viewer.load(), SIZE, **settings)
+
+
+def test_unknown_joints_and_other_objects_are_refused():
+    with pytest.raises(RigError, match='no actor, joint or point is called "nobody"'):
+        viewer.render(viewer.load(), SIZE, look_at="nobody")
+    with pytest.raises(ViewerError, match=r"^render: expected a scene or an actor, found list"):
+        viewer.render([viewer.load()])
+
+
+def test_given_options_are_not_changed():
+    options = viewer.DisplayOptions(samples=1)
+    viewer.render(viewer.load(), SIZE, options=options, scalar="weight:head", background="white")
+    assert options == viewer.DisplayOptions(samples=1)
