@@ -196,6 +196,7 @@ class VideoSink:
 
     def _picture(self, pixels: Bytes) -> VideoFrame:
         """Return the pixels in FFmpeg's memory, with repeated edges if the size must be even."""
+        # Its scaler may read 16 bytes beyond the pixels (AVFrame.data), so they must be copied.
         (wide, high), (height, width) = self._coded, pixels.shape[:2]
         picture: VideoFrame = self._av.VideoFrame(wide, high, "rgba")
         plane = picture.planes[0]
