@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from viewer.app.window import show
     from viewer.batching.report import Report
     from viewer.commands._batch.calling import batch
-    from viewer.commands._picture import render
+    from viewer.commands._pictures import render, video
     from viewer.errors import ViewerError
     from viewer.export import export
     from viewer.formats import write
@@ -91,6 +91,7 @@ __all__ = [
     "shaped",
     "show",
     "vertices",
+    "video",
     "with_rest_mesh",
     "write",
 ]
@@ -133,12 +134,13 @@ _HOMES = {
     "motion": "rig.motion.motion_arrays",
     "onion": "rig.motion.onion",
     "record_of": "rig.posing.pose_record",
-    "render": "commands._picture",
+    "render": "commands._pictures",
     "rest_pose": "rig.pose",
     "sample": "rig.motion.clip",
     "shaped": "rig.shape",
     "show": "app.window",
     "vertices": "rig.motion.actor_arrays",
+    "video": "commands._pictures",
     "with_rest_mesh": "rig.shape",
     "write": "formats",
 }

@@ -113,7 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(slots=True, eq=False)
-class _Drawing:
+class Drawing:
     """What is drawn, how, and where it is written."""
 
     asked: SceneOptions
@@ -148,7 +148,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_suffix(asked, output)
     request = settings_of(Request, arguments, output=output)
     quality = arguments.video_quality is not None
-    _complete(request, asked.frames, view, arguments.panels, has_quality=quality)
+    complete(request, asked.frames, view, arguments.panels, has_quality=quality)
     if request.kind != "pictures":
         check_targets([output], inputs_of(asked), arguments.force)
     options, is_chosen = display_of(arguments), arguments.quality is not None
@@ -172,20 +172,20 @@ def run(arguments: argparse.Namespace) -> int:
     print_warnings(choose_subject(scene, options))
     notes = camera_notes(view, asked.motion, scene, options)
     print_warnings(warn_of_missing(scene, options) + notes)
-    drawing = _Drawing(
+    drawing = Drawing(
         *(asked, view, options, request, size),
         *(arguments.force, arguments.panels, arguments.gpu, is_chosen),
     )
     if request.kind == "onion":
         _draw_onion(drawing, scene)
     elif request.kind and (request.is_certain or any(a.clip for a in scene.actors)):
-        print(_draw_sequence(drawing, scene), file=summary_stream(output))
+        print(draw_sequence(drawing, scene), file=summary_stream(output))
     else:
         _draw_still(drawing, scene)
     return 0
 
 
-def _draw_still(drawing: _Drawing, scene: Scene) -> None:
+def _draw_still(drawing: Drawing, scene: Scene) -> None:
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
 
@@ -210,7 +210,7 @@ def _draw_still(drawing: _Drawing, scene: Scene) -> None:
     print(line, file=summary_stream(output))
 
 
-def _draw_onion(drawing: _Drawing, scene: Scene) -> None:
+def _draw_onion(drawing: Drawing, scene: Scene) -> None:
     """Draw several poses of a motion in one image."""
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
@@ -308,7 +308,7 @@ def _grid_step(points: Floats) -> float:
     return grid_step(bounding_box(points))
 
 
-def _complete(
+def complete(
     request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
 ) -> None:
     """Set the requested output's kind and range of frames; refuse options that do not fit it."""
@@ -394,7 +394,7 @@ def _check_onion(request: Request, frames: Frames, view: ViewOptions) -> None:
         raise ViewerError("--onion: expected the name of a picture, such as .png, found a video")
 
 
-def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
+def draw_sequence(drawing: Drawing, scene: Scene) -> str:
     """Draw and write all frames; return a line about the written files."""
     from viewer.commands._progress import shown_progress
     from viewer.rendering.camera_views import with_cameras

@@ -67,3 +67,56 @@ def test_given_options_are_not_changed():
     options = viewer.DisplayOptions(samples=1)
     viewer.render(viewer.load(), SIZE, options=options, scalar="weight:head", background="white")
     assert options == viewer.DisplayOptions(samples=1)
+
+
+def moving_square() -> viewer.Actor:
+    turns = np.zeros((4, 1, 3))
+    turns[:, 0, 2] = np.linspace(0.0, 1.0, 4)
+    square = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    figure = viewer.figure(square, [[0, 1, 2, 3]], weights=np.ones((4, 1)), joints=[[0, 0, 0]])
+    return viewer.animate(figure, turns, fps=2)
+
+
+def test_numbered_images_are_those_of_each_time(tmp_path):
+    actor, settings = moving_square(), {"azimuth": 0.0, "distance": 9.0, "look_at": "joint_0"}
+    # The ground of a video lies below its whole motion.
+    settings["options"] = viewer.DisplayOptions(grid=False, shadows=False)
+    viewer.video(actor, tmp_path / "a_{frame}.png", SIZE, frames=range(1, 4, 2), **settings)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a_1.png", "a_3.png"]
+    for frame in (1, 3):
+        alone = viewer.render(actor, SIZE, time=0.5 * frame, **settings)
+        found = read_picture(Source.open(tmp_path / f"a_{frame}.png"))
+        assert (np.abs(found.astype(int) - alone).max(axis=-1) > 2).mean() < 0.02
+
+
+def test_video_has_the_frames_of_the_motion(tmp_path):
+    av = pytest.importorskip("av")
+    for name, settings, count in (
+        ("motion.mp4", {}, 4),
+        ("faster.mp4", {"fps": 4}, 7),
+        ("turn.mp4", {"turntable": True}, 4),
+    ):
+        viewer.video(moving_square(), tmp_path / name, SIZE, **settings)
+        with av.open(tmp_path / name) as container:
+            assert sum(1 for _ in container.decode(video=0)) == count
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "message"),
+    [
+        ("a.png", {}, "^path: expected a video"),
+        ("a.mp4", {"frames": range(9, 12)}, "^frames: expected a range within 0:4"),
+        ("a.mp4", {"speed": 0.0}, "^speed: expected 0.001 to 1000"),
+        ("a.mp4", {"turntable": -1.0}, "^turntable: expected seconds"),
+        ("a.mp4", {"quality": "best"}, "^quality: no value"),
+    ],
+)
+def test_videos_that_cannot_be_recorded_are_refused(tmp_path, name, settings, message):
+    with pytest.raises(ViewerError, match=message):
+        viewer.video(moving_square(), tmp_path / name, SIZE, **settings)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_still_scenes_need_a_turntable(tmp_path):
+    with pytest.raises(ViewerError, match="^nothing moves: "):
+        viewer.video(viewer.load(), tmp_path / "a.mp4", SIZE)

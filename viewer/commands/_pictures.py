@@ -1,0 +1,254 @@
+"""``viewer.render`` and ``viewer.video``, with the settings of the command ``render``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from viewer.commands._scalar import scalar_notes
+from viewer.commands._scene import SceneOptions
+from viewer.commands._sequence import Request, parse_turntable
+from viewer.commands._view import ViewOptions, camera_of
+from viewer.errors import ViewerError
+from viewer.near_names import name_hint
+from viewer.phrases import printable
+from viewer.rendering.camera import Camera
+from viewer.rendering.camera_views import with_cameras
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.offscreen import render as draw
+from viewer.rendering.options import SIZE, DisplayOptions, Quality
+from viewer.rig.arrays import Bytes
+from viewer.rig.motion.evaluation import pose_actors
+from viewer.rig.scene import Actor, Scene, scene_points
+
+
+def render(
+    scene: Scene | Actor,
+    size: tuple[int, int] = SIZE,
+    camera: Camera | None = None,
+    options: DisplayOptions | None = None,
+    *,
+    time: float | None = None,
+    look_at: str | None = None,
+    distance: float | None = None,
+    azimuth: float | None = None,
+    inclination: float | None = None,
+    orthographic: bool = False,
+    scalar: str | None = None,
+    background: str | None = None,
+    quality: Quality | None = None,
+) -> Bytes:
+    """Draw a scene or one actor without a window.
+
+    The context is created on first use and cached, one per thread; use ``Offscreen`` to manage it.
+    Afterwards no context is current in this thread.
+
+    Parameters
+    ----------
+    scene : Scene or Actor
+        What is drawn, in its current pose; actors keep their pose.
+    size : (int, int)
+        Width and height in pixels.
+    camera : Camera, optional
+        Camera; by default one that frames the scene, with the settings below.
+    options : DisplayOptions, optional
+        Display options; shadows are drawn (quality normal) if omitted.
+    time : float, optional
+        Seconds of the motions; the current pose if omitted.
+    look_at : str, optional
+        Joint or actor at which the camera aims: ``"head"``, ``"fox/head"``, ``"1:pelvis"``.
+    distance : float, optional
+        Distance from the target, scene units.
+    azimuth, inclination : float, optional
+        Degrees about the up axis, and above the horizon.
+    orthographic : bool
+        Parallel projection.
+    scalar : str, optional
+        Numbers that are shown as colours, such as ``"weight:left_knee"``.
+    background : str, optional
+        ``"gradient"``, ``"white"``, ``"environment"``, ``"transparent"`` or ``"#rrggbb"``.
+    quality : "draft", "normal" or "final", optional
+        Without or with shadows, or with soft shadows and ambient occlusion.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB and alpha, first row at the top.
+
+    Raises
+    ------
+    ViewerError
+        If a setting has no such value, or the driver cannot draw an image of this size.
+    RigError
+        If there is no such joint, actor or quantity.
+    RenderError
+        If there is no usable OpenGL.
+
+    >>> import viewer
+    >>> viewer.render(viewer.load(), size=(64, 48)).shape
+    (48, 64, 4)
+    """
+    scene, shown = _scene_of(scene, "render"), _display(options, background, quality, scalar)
+    if time is not None:
+        scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
+        pose_actors(scene.actors, time)
+    view = ViewOptions(
+        look_at=look_at,
+        distance=distance,
+        azimuth=azimuth,
+        inclination=inclination,
+        orthographic=orthographic,
+    )
+    if view != ViewOptions() and camera is not None:
+        raise ViewerError("camera: expected it or settings of the view, found both")
+    with _without_dashes():
+        _check_scalar(scene, shown)
+        if camera is None and view != ViewOptions():
+            points = with_cameras(scene, shown, scene_points(scene, shown.show))
+            camera = camera_of(view, scene, points, size)
+    return draw(scene, size, camera, shown)
+
+
+def video(
+    scene: Scene | Actor,
+    path: str | Path,
+    size: tuple[int, int] = SIZE,
+    options: DisplayOptions | None = None,
+    *,
+    frames: range | None = None,
+    fps: float | None = None,
+    speed: float | None = None,
+    turntable: bool | float = False,
+    look_at: str | None = None,
+    follow: str | None = None,
+    distance: float | None = None,
+    azimuth: float | None = None,
+    inclination: float | None = None,
+    orthographic: bool = False,
+    scalar: str | None = None,
+    background: str | None = None,
+    quality: Quality | None = None,
+) -> None:
+    """Record the motions of a scene or one actor; an existing file is replaced.
+
+    Parameters
+    ----------
+    scene : Scene or Actor
+        What is drawn. Without a motion, the camera must rotate.
+    path : str or Path
+        ``.mp4``, ``.webm`` or ``.gif`` (they need PyAV), or numbered images, as in
+        ``frame_{frame:05}.png``.
+    size : (int, int)
+        Width and height in pixels.
+    options : DisplayOptions, optional
+        Display options; shadows are drawn (quality normal) if omitted.
+    frames : range, optional
+        Numbers of the frames; the whole motion if omitted.
+    fps : float, optional
+        Frames per second; those of the motion if omitted.
+    speed : float, optional
+        0.5 is half as fast, -1 backwards.
+    turntable : bool or float
+        Rotate the camera once during the motion, or in this number of seconds.
+    look_at, follow : str, optional
+        Joint or actor at which the camera aims at the start, or that it follows.
+    distance, azimuth, inclination, orthographic, scalar, background, quality
+        As in ``viewer.render``.
+
+    Raises
+    ------
+    ViewerError
+        If nothing moves, a setting has no such value, or PyAV is missing.
+    OutputError
+        If a file cannot be written.
+    """
+    # The command's other needs are not those of ``render``.
+    from viewer.commands.render import Drawing, complete, draw_sequence
+
+    scene, shown = _scene_of(scene, "video"), _display(options, background, quality, scalar)
+    view = ViewOptions(
+        look_at=look_at,
+        follow=follow,
+        distance=distance,
+        azimuth=azimuth,
+        inclination=inclination,
+        orthographic=orthographic,
+    )
+    asked = SceneOptions([])
+    if frames is not None:
+        asked.frames.frames = f"{frames.start}:{frames.stop}:{frames.step}"
+    asked.frames.fps = fps
+    request = Request(Path(path), speed=speed)
+    with _without_dashes():
+        if turntable is not False:
+            request.turntable = parse_turntable("" if turntable is True else str(turntable))
+        complete(request, asked.frames, view, panels=False, has_quality=False)
+        if request.kind not in ("video", "pictures"):
+            raise ViewerError(
+                "path: expected a video (.mp4, .webm, .gif) or numbered images, as in "
+                f"frame_{{frame:05}}.png, found {printable(path, 300)}"
+            )
+        _check_scalar(scene, shown)
+        draw_sequence(
+            Drawing(
+                *(asked, view, shown, request, size),
+                force=True,
+                panels=False,
+                device=None,
+                is_chosen=True,
+            ),
+            scene,
+        )
+
+
+def _scene_of(what: Scene | Actor, name: str) -> Scene:
+    scene = Scene([what]) if isinstance(what, Actor) else what
+    if not isinstance(scene, Scene):
+        raise ViewerError(f"{name}: expected a scene or an actor, found {type(scene).__name__}")
+    return scene
+
+
+def _display(
+    options: DisplayOptions | None,
+    background: str | None,
+    quality: Quality | None,
+    scalar: str | None,
+) -> DisplayOptions:
+    """Return a copy of display options with the given values, all of which are checked."""
+    shown = replace(DisplayOptions(quality="normal") if options is None else options)
+    shown.background = background or shown.background
+    shown.quality = quality or shown.quality
+    if scalar is not None:
+        shown.scalar, shown.shading = scalar, "scalar"
+    check_choices(shown)
+    return shown
+
+
+def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
+    for note in scalar_notes(scene, options):
+        raise ViewerError(note)
+
+
+@contextmanager
+def _without_dashes() -> Iterator[None]:
+    """Name settings in errors as in Python: messages of the command name its options."""
+    try:
+        yield
+    except ViewerError as problem:
+        text = str(problem)
+        if not text.startswith("--"):
+            raise
+        raise type(problem)(text.removeprefix("--").removeprefix("scalar ")) from None
+
+
+def check_choices(options: DisplayOptions) -> None:
+    """Raise ViewerError if a display option has none of its possible values."""
+    for each in dataclasses.fields(options):
+        choices = SHADING_CHOICES if each.name == "shading" else each.metadata.get("choices")
+        value = getattr(options, each.name)
+        if choices and value not in choices:
+            hint = name_hint(str(value), [*choices])
+            raise ViewerError(f'{each.name}: no value "{printable(value, 60)}"; {hint}')
