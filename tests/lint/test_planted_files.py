@@ -266,14 +266,14 @@ def test_every_code_is_produced_by_a_planted_fault():
     from formats.gltf.planted_gltf import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES
     from lint.test_bad_keys import FAULTS as KEYS
-    from lint.test_bad_weights import FAULTS as WEIGHTS
+    from lint.test_bad_rigs import FAULTS as RIGS
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     # C019: test_motion_of_another_gender_is_found.
     planted |= {code for _, code in MODELS.values()} | {"F001", "C019"}
     planted |= set(GLTF)
-    # test_bad_keys and test_bad_weights
-    planted |= {key.partition(".")[0] for _, key, *_ in [*KEYS.values(), *WEIGHTS.values()]}
-    planted |= {"W012", "W014"}
+    # test_bad_keys and test_bad_rigs
+    planted |= {key.partition(".")[0] for _, key, *_ in [*KEYS.values(), *RIGS.values()]}
+    planted |= {"S013", "W012", "W014"}
     # A readable file cannot cause these codes, which are remarks and not errors.
     assert set(CODES) - planted == {"F007"}

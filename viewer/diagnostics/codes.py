@@ -101,6 +101,7 @@ CODES: dict[str, Code] = {
         "warning", "reflected bind matrix", "freeze the negative scale and rebind this joint"
     ),
     "B006": Code("error", "non-affine bind matrix", "set its last row to 0 0 0 1"),
+    "B007": Code("warning", "rotated binding", "rebind these joints at rest"),
     # Skeletons and their limits
     "S001": Code("error", "parent after its child", "list parents before their children"),
     "S002": Code("error", "cyclic hierarchy", "give one of these joints another parent"),
@@ -116,6 +117,9 @@ CODES: dict[str, Code] = {
     ),
     "S009": Code("warning", "non-unit rest rotation", "normalise the quaternion"),
     "S010": Code("warning", "non-positive rest scale", "freeze the scale of this joint"),
+    "S011": Code("warning", "bone without length", "move the joint to the end of its bone"),
+    "S012": Code("warning", "joint outside the mesh", "move the joint into the limb"),
+    "S013": Code("warning", "upside-down rig", "rotate the figure, or correct its up axis"),
     # Meshes and their symmetry
     "M001": Code("warning", "degenerate triangles", "merge their corners or delete them"),
     "M002": Code("warning", "flipped triangles", "reverse their winding"),
@@ -131,6 +135,7 @@ CODES: dict[str, Code] = {
     "M010": Code("warning", "stray vertices", "move or delete them"),
     "M011": Code("warning", "duplicate triangles", "delete the copies"),
     "M012": Code("warning", "non-orientable surface", "cut it where the winding reverses"),
+    "M013": Code("warning", "spikes", "move these vertices back to the surface"),
     "Y001": Code("warning", "asymmetric positions", "mirror one side"),
     "Y002": Code("warning", "asymmetric weights", "mirror the weights of one side"),
     "Y003": Code("warning", "asymmetric joints", "move one of them to the mirrored position"),

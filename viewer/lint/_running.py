@@ -40,7 +40,9 @@ CHECKS = {
     "blending": Check("blending of weights"),
     "bindings": Check("bind matrices"),
     "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
+    "joint_places": Check("places of joints"),
     "meshes": Check("mesh"),
+    "spikes": Check("spikes"),
     "symmetry": Check("symmetry"),
     "clips": Check("clip", of_motion=True, of_animations=True),
     "pops": Check("pops", of_motion=True, of_animations=True),

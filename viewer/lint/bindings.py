@@ -8,9 +8,10 @@ import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
-from viewer.phrases import counted
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.inspection.faults import are_usable, bind_faults
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
@@ -19,6 +20,9 @@ from viewer.rig.skeleton import joint_labels
 
 # Fraction of the figure's size: smaller differences are rounding errors of old files.
 _ELSEWHERE = 0.01
+_ASTRAY = np.radians(5.0)  # smallest rotation of a joint that is seen
+_SEVERAL = 8  # minimum number of joints that show what is usual
+_FEW = 0.25  # maximum fraction of joints that are exceptions
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -29,6 +33,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     yield from subject.faults(bind_faults(figure, subject.invalid))
     usable = subject.valid("bindings", figure.skin.n_joints) & are_usable(figure.skin)
     yield from _elsewhere(subject, figure, usable)
+    yield from _rotated(subject, figure, usable)
 
 
 def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
@@ -61,4 +66,37 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Find
         distance=subject.length(float(distances[first])),
         joints=away,
         at=("bindings", first),
+    )
+
+
+def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
+    """Report single joints that rotate the mesh at rest, while most do not."""
+    skin, skeleton = figure.skin, figure.skeleton
+    if skin is None or skeleton is None or figure.mesh is None:
+        return
+    used = np.unique(skin.joints[skin.weights > 0.0])
+    used = used[usable[used] & subject.valid("joints", skeleton.n_joints)[used]]
+    if len(used) < _SEVERAL:
+        return
+    worlds = world_matrices(skeleton, rest_pose(skeleton))[used]
+    turns, _ = nearest_rotations((worlds @ skin.inverse_bind[used])[:, :3, :3])
+    # Angles between the rotations of all pairs, from trace(A^T B) = 1 + 2 cos; the pose of most
+    # joints is that of the mesh.
+    traces = np.einsum("iab,jab->ij", turns, turns)
+    angles = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    usual = int((angles < _ASTRAY).sum(axis=1).argmax())
+    off = np.flatnonzero(angles[usual] > _ASTRAY)
+    if len(off) == 0 or len(off) > _FEW * len(used):
+        return  # the mesh is bound in another pose: a note says so
+    off = off[np.argsort(-angles[usual][off], kind="stable")]
+    joints, labels = used[off], joint_labels(skeleton)
+    yield subject.found(
+        "B007.rotations: {n} bound with another rotation than at rest: {names} (worst: {joint} by "
+        "{angle:.0f}°)",
+        n=counted(len(joints), "joint", "is", "are"),
+        names=listed([labels[joint] for joint in joints]),
+        joint=labels[joints[0]],
+        angle=float(np.degrees(angles[usual][off[0]])),
+        joints=joints,
+        at=("bindings", int(joints[0])),
     )

@@ -86,6 +86,7 @@ def _duplicate_triangles(subject: Subject, mesh: Mesh, whole: Indices) -> Iterat
         "M011.triangles: {n} (first: triangle {triangle})",
         n=counted(len(copies), "duplicate triangle"),
         triangle=int(copies[0]),
+        severity=_severity(len(copies), mesh.n_triangles),
         triangles=copies,
         at=("triangles", int(copies[0])),
     )
@@ -107,6 +108,7 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> Iterator[Fin
         most=int(edges.counts.max()),
         vertex=int(ends[0, 0]),
         other=int(ends[0, 1]),
+        severity=_severity(len(ends), mesh.n_triangles),
         triangles=triangles,
         vertices=vertices,
         at=("positions", int(ends[0, 0])),

@@ -1,4 +1,4 @@
-"""Faults of weights and of symmetry in the bundled body, which has none."""
+"""Faults of weights, joints, bindings and sides in the bundled body, which has none."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,16 +7,27 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from lint.sound import make_mesh, make_skeleton
 
 import viewer
-from viewer.lint import Finding, Subject, blending, stray_weights, symmetry
+from viewer.lint import (
+    Finding,
+    Subject,
+    bindings,
+    blending,
+    joint_places,
+    spikes,
+    stray_weights,
+    symmetry,
+)
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
-from viewer.rig.skin import normalized, owners, skin_from_entries, skin_rows
+from viewer.rig.skin import normalized, owners, skin_from_entries, skin_from_lists, skin_rows
 
-CHECKS = (stray_weights, blending, symmetry)
+CHECKS = (stray_weights, blending, bindings, joint_places, spikes, symmetry)
 
 
 @cache
@@ -166,6 +177,44 @@ def limited() -> Figure:
     return replace(body(), skeleton=replace(skeleton, dof_limits=limits))
 
 
+def turned() -> Figure:
+    """Return the body whose left knee is bound with a rotation of 30 degrees about z."""
+    binds = body().skin.inverse_bind.copy()
+    turn = np.eye(4)
+    turn[:3, :3] = axis_rotations(2, np.radians(-30.0))
+    binds[joint("left_knee")] = turn @ binds[joint("left_knee")]
+    return replace(body(), skin=replace(body().skin, inverse_bind=binds))
+
+
+def flattened() -> Figure:
+    """Return the body whose left elbow is at its shoulder."""
+    return moved(("left_elbow", list(-body().skeleton.rest_translations[joint("left_elbow")])))
+
+
+def spiked() -> Figure:
+    """Return the body with one vertex of its symmetric mesh 30 mm out of the surface."""
+    mesh = body().mesh
+    points = mesh.positions.copy()
+    points[NOSE] += 0.03 * mesh.normals[NOSE]
+    return replace(body(), mesh=replace(mesh, positions=points))
+
+
+def stuck_out() -> Figure:
+    """Return the body with one vertex 300 mm out of the surface."""
+    mesh = body().mesh
+    points = mesh.positions.copy()
+    points[NOSE] += 0.3 * mesh.normals[NOSE]
+    return replace(body(), mesh=replace(mesh, positions=points))
+
+
+CHECKED = {
+    ("W011", "W012", "W013"): stray_weights,
+    ("W014", "W015", "W016"): blending,
+    ("B",): bindings,
+    ("S",): joint_places,
+    ("M",): spikes,
+    ("Y",): symmetry,
+}
 LEG = ("hip", "knee", "ankle", "foot")
 FAULTS = {
     "stray vertex": (stray(1.0), "W011.strays", ["right_foot"], [NOSE]),
@@ -182,6 +231,14 @@ FAULTS = {
         lambda: moved(("left_elbow", [0.0, 0.1, 0.0])), "Y003.joints",
         ["left_elbow", "right_elbow"], [],
     ),
+    "bound with 30 degrees": (turned, "B007.rotations", ["left_knee"], []),
+    "elbow at the shoulder": (flattened, "S011.joints", ["left_elbow"], []),
+    "knees before the legs": (
+        lambda: moved(("left_knee", [0.0, 0.0, 0.2]), ("right_knee", [0.0, 0.0, 0.2])),
+        "S012.joints", ["left_knee", "right_knee"], [],
+    ),
+    "spike of 30 mm": (spiked, "M013.vertices", [], [NOSE]),
+    "spike of 300 mm": (stuck_out, "M013.vertices", [], [NOSE]),
     "names swapped": (renamed, "Y004.names", ["left_knee", "right_knee"], []),
     "limits of one knee": (limited, "Y005.limits", ["left_knee", "right_knee"], []),
 }  # fmt: skip
@@ -190,7 +247,8 @@ FAULTS = {
 @pytest.mark.parametrize("name", FAULTS)
 def test_fault_is_found_at_its_joints_and_vertices(name):
     make, key, joints, vertices = FAULTS[name]
-    (found,) = [one for one in linted(make()) if one.diagnostic.key == key]
+    check = next(check for codes, check in CHECKED.items() if key.startswith(codes))
+    (found,) = [one for one in linted(make(), (check,)) if one.diagnostic.key == key]
     assert found.severity == "warning"
     if joints is not None:
         names = body().skeleton.names
@@ -200,12 +258,62 @@ def test_fault_is_found_at_its_joints_and_vertices(name):
     assert vertices is None or sorted(found.vertices.tolist()) == vertices
 
 
-@pytest.mark.parametrize(("scale", "up"), [(100.0, "y"), (0.01, "z")])
-def test_body_has_no_finding_in_any_unit(scale, up):
+@pytest.mark.parametrize(("scale", "up"), [(0.01, "z")])
+def test_body_has_no_finding_in_other_axes(scale, up):
     figure = placed(body(), scale, up)
     assert linted(figure) == []
-    again = linted(placed(stray(0.3)(), scale, up))
+    again = linted(placed(stray(0.3)(), scale, up), (stray_weights,))
     assert [one.diagnostic.key for one in again] == ["W011.strays"]
+
+
+def test_part_that_moves_with_a_distant_joint_is_found():
+    """A patch of the head, cut off, moves with a wrist, or with the head."""
+    patch = np.flatnonzero(
+        np.linalg.norm(body().mesh.positions - body().mesh.positions[NOSE], axis=1) < 0.03
+    )
+    mesh = body().mesh
+    inside = np.isin(mesh.triangles, patch)
+    kept = mesh.triangles[inside.all(axis=1) | ~inside.any(axis=1)]
+    cut = replace(body(), mesh=Mesh(mesh.positions, mesh.normals, kept))
+    island = np.unique(mesh.triangles[inside.all(axis=1)])
+    for name, expected in (("head", []), ("left_wrist", ["W012.islands"])):
+        weights = table().copy()
+        weights[island] = np.arange(weights.shape[1]) == joint(name)
+        found = linted(weighted(weights, cut), (stray_weights,))
+        assert [one.diagnostic.key for one in found] == expected
+        assert all(sorted(one.vertices.tolist()) == island.tolist() for one in found)
+
+
+def test_figure_on_its_head_is_upside_down():
+    """With y and z reversed, the head, 1.35 m above the ankles, is below them."""
+    figure, turn = body(), np.diag([1.0, -1.0, -1.0, 1.0])
+    skeleton, mesh = figure.skeleton, figure.mesh
+    offsets, rotations = skeleton.rest_translations.copy(), skeleton.rest_rotations.copy()
+    offsets[0] = turn[:3, :3] @ offsets[0]
+    rotations[0] = 1.0, 0.0, 0.0, 0.0
+    figure = Figure(
+        figure.name,
+        Mesh(mesh.positions @ turn[:3, :3], mesh.normals @ turn[:3, :3], mesh.triangles),
+        replace(skeleton, rest_translations=offsets, rest_rotations=rotations),
+        replace(figure.skin, inverse_bind=figure.skin.inverse_bind @ turn),
+        unit="m",
+    )
+    (found,) = linted(figure, (bindings, joint_places, spikes))
+    assert found.code == "S013" and "the head is 1.3" in found.message
+
+
+def test_animal_on_its_back_is_upside_down():
+    names = ("body", "head", "fore_foot_l", "fore_foot_r")
+    places = np.array([[0.0, 1, 0], [0.0, 1.2, 1], [0.3, 0, 0.5], [-0.3, 0, 0.5]])
+    for flip, expected in ((1.0, []), (-1.0, ["S013"])):
+        joints = places * [1.0, flip, 1.0]
+        binds = np.tile(np.eye(4), (4, 1, 1))
+        binds[:, :3, 3] = -joints
+        offsets = joints - [[0, 0, 0], *[joints[0]] * 3]
+        mesh = make_mesh(joints, [[0, 1, 2], [0, 2, 3]])
+        skin = skin_from_lists([[(k, 1.0)] for k in range(4)], binds)
+        figure = Figure("cat", mesh, make_skeleton(names, [-1, 0, 0, 0], offsets), skin, unit="m")
+        assert [one.code for one in linted(figure, (joint_places,))] == expected
 
 
 def apart(figure: Figure, vertices: np.ndarray) -> tuple[Figure, np.ndarray]:
