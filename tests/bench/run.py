@@ -26,6 +26,7 @@ NAMES = [
     "lint",
     "feet",
     "transfer",
+    "binding",
     "video",
     "quality",
 ]

@@ -1,0 +1,90 @@
+"""Deformation of meshes bound to their artists' skeletons, compared with the artists' weights.
+
+Measured by ``evaluate_rig.py`` on the characters beside it, ``../shared/data/rigging``: in five
+poses, the mean distance of vertices from the artist's result as a percentage of the figure's longest
+side; the same for the 95th percentile; L1 distance of weights by body part. Names select characters.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import BINDING, TransferSettings
+from viewer.autorig.weights.weight_transfer import WeightSettings
+from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import depth_first
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.pose import rest_pose
+from viewer.rig.skeleton import ball_skeleton
+
+CHARACTERS = Path(__file__).resolve().parents[3] / "shared" / "data" / "rigging"
+GOALS = {"heat": 0.6, "voxel": 0.8}
+"""Percent of the longest side, over all characters."""
+
+
+def main() -> None:
+    if not CHARACTERS.exists():
+        print(f"{CHARACTERS}: not there, nothing measured")
+        return
+    sys.path.insert(0, str(CHARACTERS))
+    import evaluate_rig
+
+    chosen = [name for name in sys.argv[1:] if (CHARACTERS / f"{name}.npz").exists()]
+    found: dict[str, list[float]] = {method: [] for method in BINDING}
+    for path in sorted(CHARACTERS.glob("*.npz")):
+        if chosen and path.stem not in chosen:
+            continue
+        truth = _truth(evaluate_rig, path)
+        if truth is None:
+            continue
+        cells = []
+        for method in BINDING:
+            start = time.process_time()
+            weights = bound(truth, np.load(path)["parents"], method)
+            taken = time.process_time() - start
+            is_quadruped = "fup_l" in truth["sem"]
+            score = evaluate_rig.compare(truth, {**truth, "W": weights}, is_quadruped)
+            found[method].append(score["def_mean"])
+            cells.append(
+                f"{method} {score['def_mean']:.2f} (95 %: {score['def_p95']:.1f}) L1 "
+                f"{score['l1']:.2f} {taken:.1f} s"
+            )
+        print(f"  {path.stem:<14} {len(truth['V']):6} vertices   {'   '.join(cells)}")
+    for method, values in found.items():
+        mean = float(np.mean(values)) if values else 0.0
+        verdict = "met" if mean <= GOALS[method] else "missed"
+        print(f"{method}: mean deformation {mean:.3f} % (goal: {GOALS[method]} %, {verdict})")
+
+
+def _truth(evaluate_rig, path: Path):
+    """Return the artist's rig, or None if its joints have no known meaning."""
+    if str(np.load(path)["family"]) not in evaluate_rig.FAM:
+        return None
+    return evaluate_rig.truth(path)
+
+
+def bound(truth, parents, method: str) -> np.ndarray:
+    """Return the weights (V, J) of the mesh bound to the artist's joints, four for each vertex."""
+    order = depth_first(np.asarray(parents))
+    places = np.argsort(order)
+    above = np.array([places[p] if p >= 0 else -1 for p in np.asarray(parents)[order]])
+    names = tuple(str(truth["names"][joint]) for joint in order)
+    skeleton = ball_skeleton(names, above.astype(np.int32), truth["J"][order])
+    triangles = truth["F"].astype(np.int32)
+    mesh = Mesh(truth["V"], vertex_normals(truth["V"], triangles), triangles)
+    how = TransferSettings(method=method, weights=WeightSettings(max_influences=4))
+    rigged = transfer(Figure("artist", skeleton=skeleton), rest_pose(skeleton), mesh, how)
+    skin = rigged.figure.skin
+    shape = (skin.n_vertices, skin.n_joints)
+    rows = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape).toarray()
+    weights = np.zeros(shape)
+    weights[:, order] = rows
+    return weights
+
+
+if __name__ == "__main__":
+    main()
