@@ -1,8 +1,8 @@
 """Deformation of meshes bound to their artists' skeletons, compared with the artists' weights.
 
-Measured by ``evaluate_rig.py`` on the characters beside it, ``../shared/data/rigging``: in five
-poses, the mean distance of vertices from the artist's result as a percentage of the figure's longest
-side; the same for the 95th percentile; L1 distance of weights by body part. Names select characters.
+Measured by ``evaluate_rig.py`` on the characters beside it, ``../shared/data/rigging``: the mean
+distance of vertices from the artist's result in five poses, as a percentage of the longest side;
+the same for the 95th percentile; L1 distance of weights by body part. Names select characters.
 """
 
 import sys
