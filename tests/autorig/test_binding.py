@@ -140,6 +140,13 @@ def test_small_separate_part_moves_rigidly_and_is_named():
         )
 
 
+def test_mesh_with_both_sides_of_each_triangle_is_bound_like_one_with_one():
+    positions, triangles = BAR
+    both = mesh_of(positions, np.concatenate([triangles, triangles[:, ::-1]]))
+    expected = weights_of(bound(skeleton_of(CHAIN), joined(BAR)))
+    assert_allclose(weights_of(bound(skeleton_of(CHAIN), both)), expected, atol=1e-12)
+
+
 def test_roots_on_the_ground_and_controls_get_no_weights():
     high = BAR[0] + [0.0, 1.0, 0.0], BAR[1]
     joints = {"Root": ("", (0.0, 0, 0)), **{k: (p or "Root", np.add(at, [0, 1, 0]))

@@ -71,9 +71,9 @@ _ROUNDING = 1e-9
 def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
     """Bind a mesh to the posed skeleton of a figure; see ``transfer``, which checks the mesh."""
     report_fraction(0.0, "voxels")
-    mesh = weld(target.positions, target.triangles)
+    mesh = _one_sided(weld(target.positions, target.triangles))
     with part_of_work(span=(0.0, 0.2)):
-        solid = solid_of(target.positions, target.triangles)
+        solid = solid_of(mesh.positions, mesh.triangles)
     skeleton = shaped_skeleton(source, pose.shape_weights)
     report_fraction(0.2, "placing the skeleton")
     place = placement_matrix(pose)
@@ -140,6 +140,15 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         max_influences=how.weights.max_influences,
     )
     return with_fields(rigged, ("sees a bone", "diffused", "rigid"), "Distance to the bone")
+
+
+def _one_sided(mesh: Welded) -> Welded:
+    """Return a mesh without the second sides of triangles that are there twice.
+
+    Both sides together enclose nothing, and edges of four triangles have no Laplace operator.
+    """
+    first = np.unique(np.sort(mesh.triangles, axis=1), axis=0, return_index=True)[1]
+    return replace(mesh, triangles=mesh.triangles[np.sort(first)])
 
 
 def _deforming(source: Figure) -> Bools | None:
