@@ -15,6 +15,7 @@ from viewer.lint import (
     Subject,
     bindings,
     blending,
+    hands,
     joint_places,
     spikes,
     stray_weights,
@@ -24,7 +25,9 @@ from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor
+from viewer.rig.shape import rest_joints
 from viewer.rig.skin import normalized, owners, skin_from_entries, skin_from_lists, skin_rows
 
 CHECKS = (stray_weights, blending, bindings, joint_places, spikes, symmetry)
@@ -344,3 +347,21 @@ def test_seam_with_other_weights_on_one_side_is_torn():
     (one,) = found
     changed = torn[1.0 - weights[torn, joint("pelvis")] > 0.0]
     assert set(one.vertices.tolist()) <= set(changed.tolist()) and len(one.vertices)
+
+
+@pytest.mark.parametrize(("frames", "expected"), [(0, []), (10, [*range(20, 30)])])
+def test_wrist_in_the_chest_is_found(frames, expected):
+    """The wrist is at the joint of the chest, or 25 cm in front of it, outside of the skin."""
+    figure = body()
+    rest = rest_joints(figure)
+    chest, wrist = joint("spine3"), joint("left_wrist")
+    held = rest[chest] + [0.0, 0.0, 0.25] - rest[joint("left_elbow")]
+    keys = np.tile(held, (60, 1))
+    keys[20 : 20 + frames] -= [0.0, 0.0, 0.25]
+    channel = TransformChannel(wrist, "translation", np.arange(60) / 30.0, keys)
+    actor = Actor(figure, clip=TransformClip("x", (channel,), 0.0, 59 / 30.0))
+    found = [*hands.check(Subject(actor))]
+    assert [one.joints.tolist() for one in found] == ([[wrist]] if frames else [])
+    numbers = [number for one in found for number in one.frames.tolist()]
+    # Between the samples before and after, the wrist passes the skin.
+    assert set(expected) <= set(numbers) <= {19, *expected, 30}

@@ -215,6 +215,7 @@ CODES: dict[str, Code] = {
     "C022": Code("warning", "bones change length", "delete the translation keys of these joints"),
     "C023": Code("warning", "joints change size", "delete the scale keys unless intended"),
     "C024": Code("warning", "hyperextended joint", "rotate the joint to its usual side"),
+    "C025": Code("warning", "hand inside the body", "move the arm outwards in these frames"),
     "G001": Code("warning", "inconsistent glTF container", "export the file again"),
     "G002": Code("warning", "inconsistent glTF mesh data", "export the file again"),
     "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),

@@ -48,6 +48,7 @@ CHECKS = {
     "pops": Check("pops", of_motion=True, of_animations=True),
     "frozen": Check("frozen frames", of_motion=True, of_animations=True),
     "hinges": Check("elbows and knees", of_motion=True, of_animations=True),
+    "hands": Check("hands", of_motion=True, of_animations=True),
     "stretch": Check("lengths of bones", of_motion=True, of_animations=True),
     "feet": Check("feet", of_motion=True, of_animations=True),
     "captures": Check("captured points", of_motion=True),

@@ -27,8 +27,10 @@ from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.transform import apply_transform, mean_scale
 from viewer.rig.geometry.vectors import Up, axis_vector
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
@@ -259,6 +261,14 @@ def travelling_joints(track: Track, skeleton: Skeleton) -> Ints:
             n_below[skeleton.parents[joint]] += n_below[joint]
     moved = (moves * track.scale > _STAYS * track.size) & (n_below > _MOST_JOINTS * len(n_below))
     return np.flatnonzero(carries | moved).astype(np.int32)
+
+
+def world_turns(rotations: Floats, skeleton: Skeleton, joint: int) -> Floats:
+    """Return the rotation of a joint relative to the figure in each frame: (F, 4)."""
+    result = rotations[:, joint]
+    for above in path_to_root(skeleton.parents, joint)[1:]:
+        result = multiply(rotations[:, above], result)
+    return result
 
 
 def _track(subject: Subject) -> Track | None:

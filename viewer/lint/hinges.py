@@ -8,13 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.lint._finding import Finding
-from viewer.lint._subject import Subject, Track, track_of
+from viewer.lint._subject import Subject, Track, track_of, world_turns
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.hierarchy import path_to_root
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -52,7 +49,7 @@ def _hinge(
     thigh = unit(places[:, hinge] - places[:, upper])
     shin = unit(places[:, lower] - places[:, hinge])
     # The space of the upper part, in axes of the figure: only its changes matter.
-    turns = _world_turns(track.rotations[rows], skeleton, upper)
+    turns = world_turns(track.rotations[rows], skeleton, upper)
     across = np.cross(thigh, shin) @ subject.actor.placement[:3, :3]
     axes = np.einsum("fba,fb->fa", quaternion_to_matrix(turns), across / (track.scale or 1.0))
     lengths = np.linalg.norm(axes, axis=1)
@@ -81,11 +78,3 @@ def _hinge(
         times=track.times[each],
         at=("frames", first),
     )
-
-
-def _world_turns(rotations: Floats, skeleton: Skeleton, joint: int) -> Floats:
-    """Return the rotation of a joint relative to the figure in each frame: (F, 4)."""
-    result = rotations[:, joint]
-    for above in path_to_root(skeleton.parents, joint)[1:]:
-        result = multiply(rotations[:, above], result)
-    return result
