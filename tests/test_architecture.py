@@ -247,6 +247,15 @@ def test_shaders_state_their_version_and_use_name_prefixes():
         assert not re.findall(r"^uniform \w+ (?!u_)", text, re.MULTILINE), path
 
 
+def test_uniforms_are_set_in_one_place_only():
+    """Values set elsewhere would not be noticed by ``set_uniforms``, which skips known ones."""
+    setting = re.compile(r"""\[f?["']u_\w+["']\](?:\.value)?(?:,.*)? = |\]\.write\(""")
+    assert setting.search('program["u_size"], program["u_step"] = 1.0, 2.0')
+    found = {path for path in SOURCES for line in path.read_text().splitlines()
+             if "program" in line and setting.search(line)}  # fmt: skip
+    assert not found
+
+
 def loaded_modules(script: str) -> set[str]:
     code = f"import sys\n{script}\nprint(*sys.modules, file=sys.stderr)"
     result = subprocess.run(

@@ -109,6 +109,14 @@ def test_view_matrix_is_a_rigid_motion_with_the_target_ahead(up, azimuth, inclin
     np.testing.assert_allclose(view[:3, :3], np.stack(camera_axes(camera)), atol=1e-9)
 
 
+def test_matrices_belong_to_the_caller():
+    camera, box = Camera(np.ones(3), 4.0, 20.0, 10.0), np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 1.0]])
+    expected = camera.view_matrix().tolist(), camera.projection_matrix(1.5, box).tolist()
+    camera.view_matrix()[:] = 0.0
+    camera.projection_matrix(1.5, box)[:] = 0.0
+    assert (camera.view_matrix().tolist(), camera.projection_matrix(1.5, box).tolist()) == expected
+
+
 def test_poles_are_reached_without_a_jump():
     for sign in (1, -1):
         at = Camera(azimuth=40.0, inclination=90.0 * sign).view_matrix()

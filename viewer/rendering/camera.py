@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -98,9 +99,9 @@ class Camera:
             from viewer.rendering.pinhole import pinhole_view
 
             return pinhole_view(pinhole)
-        _, up, _ = camera_axes(self)
-        # pyrr's matrices are for row vectors.
-        return np.array(matrix44.create_look_at(eye(self), self.target, up, dtype="f8")).T
+        target = tuple(map(float, self.target))
+        orbit = self.azimuth, self.inclination, self.distance, *target, self.up
+        return _look_at(*orbit).copy()
 
     def projection_matrix(self, aspect: float, box: Floats) -> Floats:
         """Return the matrix from camera to clip space, for column vectors.
@@ -122,24 +123,47 @@ class Camera:
             from viewer.rendering.pinhole import pinhole_projection
 
             return pinhole_projection(pinhole, aspect, box)
-        reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
-        reach = reach or self.distance  # even an empty scene needs a depth range
-        far = self.distance + 20.0 * reach
-        if self.orthographic:
-            half = self.half_height
-            near = self.distance - 20.0 * reach
-            matrix = matrix44.create_orthogonal_projection(
-                -half * aspect, half * aspect, -half, half, near, far, dtype="f8"
-            )
-        else:
-            near = max(self.distance - reach, 5e-3 * self.distance)
-            matrix = matrix44.create_perspective_projection(self.fov, aspect, near, far, dtype="f8")
-        return np.array(matrix).T
+        lens = self.distance, self.fov, self.orthographic, aspect
+        places = *map(float, self.target), *box.ravel().tolist()
+        return _projection(*lens, *places).copy()
 
     @property
     def half_height(self) -> float:
         """Half the visible height at the target, scene units."""
         return self.distance * math.tan(math.radians(self.fov) / 2)
+
+
+# A moving figure is seen from where it was seen in the last frame, and an orbit keeps its lens.
+@lru_cache(maxsize=16)
+def _look_at(
+    azimuth: float, inclination: float, distance: float, x: float, y: float, z: float, up: Up
+) -> Floats:
+    """Return the view matrix of a camera that orbits the target (x, y, z)."""
+    camera = Camera(np.array([x, y, z]), distance, azimuth, inclination, up=up)
+    upward = camera_axes(camera)[1]
+    # pyrr's matrices are for row vectors.
+    return np.array(matrix44.create_look_at(eye(camera), camera.target, upward, dtype="f8")).T
+
+
+@lru_cache(maxsize=16)
+def _projection(
+    distance: float, fov: float, orthographic: bool, aspect: float, *places: float
+) -> Floats:
+    """Return the projection matrix; ``places``: the target and the two corners of the box."""
+    target, box = np.array(places[:3]), np.array(places[3:]).reshape(2, -1)
+    reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - target))
+    reach = reach or distance  # even an empty scene needs a depth range
+    far = distance + 20.0 * reach
+    if orthographic:
+        half = Camera(distance=distance, fov=fov).half_height
+        near = distance - 20.0 * reach
+        matrix = matrix44.create_orthogonal_projection(
+            -half * aspect, half * aspect, -half, half, near, far, dtype="f8"
+        )
+    else:
+        near = max(distance - reach, 5e-3 * distance)
+        matrix = matrix44.create_perspective_projection(fov, aspect, near, far, dtype="f8")
+    return np.array(matrix).T
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:

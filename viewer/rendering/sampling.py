@@ -80,6 +80,8 @@ def _radical_inverse(number: int, base: int) -> float:
 
 def jittered(view: View, shift: tuple[float, float], size: tuple[int, int]) -> View:
     """Return a view whose image is shifted by fractions of pixels."""
+    if shift == (0.0, 0.0):
+        return view
     moved = np.eye(4)
     moved[:2, 3] = 2.0 * shift[0] / size[0], 2.0 * shift[1] / size[1]
     return replace(view, projection=moved @ view.projection)
@@ -87,8 +89,10 @@ def jittered(view: View, shift: tuple[float, float], size: tuple[int, int]) -> V
 
 def tilted(direction: Floats, light: tuple[float, float]) -> Floats:
     """Return the unit vector towards a point of a light's disc: (3,)."""
-    right, above = light_axes(direction)
-    found = direction + _LIGHT_RADIUS * (light[0] * right + light[1] * above)
+    found = direction
+    if light != (0.0, 0.0):
+        right, above = light_axes(direction)
+        found = direction + _LIGHT_RADIUS * (light[0] * right + light[1] * above)
     return np.asarray(found / np.linalg.norm(found))
 
 

@@ -6,17 +6,20 @@ Matrices are in float64 until they are uploaded.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from functools import lru_cache
 
 import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera, camera_axes
-from viewer.rendering.gpu.program import set_uniforms
+from viewer.rendering.gpu.program import has_uniform, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.options import Light, Lights
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.geometry.vectors import cross
 
 _LARGEST = 1e30  # maximum of entries of normal matrices, well within the range of float32
 SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # texture units; materials and skinning use the lower ones
@@ -129,9 +132,10 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
     values = {
         "u_model_view": as_uniform(model_view),
         "u_projection": as_uniform(view.projection),
-        "u_normal_matrix": as_uniform(normal_matrix(model_view[:3, :3])),
         "u_orthographic": view.camera.is_parallel,
     }
+    if has_uniform(program, "u_normal_matrix"):
+        values["u_normal_matrix"] = as_uniform(normal_matrix(model_view[:3, :3]))
     set_uniforms(program, values)
 
 
@@ -145,36 +149,65 @@ def normal_matrix(linear: Floats) -> Floats:
         # Meshes that are almost flat, or as small as a point, exceed the range of float32.
         return found if largest < _LARGEST else found / largest
     x, y, z = linear
-    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    return np.stack([cross(y, z), cross(z, x), cross(x, y)])
 
 
 def light_axes(direction: Floats) -> tuple[Floats, Floats]:
     """Return two unit vectors at right angles to a light's direction and to each other: (3,)."""
     aside = np.eye(3)[np.argmin(np.abs(direction))]
-    right = np.cross(aside, direction)
+    right = cross(aside, direction)
     right /= np.linalg.norm(right)
-    return right, np.cross(direction, right)
+    return right, cross(direction, right)
 
 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
     """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
-    pair = (lights.key, lights.rim)
-    sky, ground = np.array(lights.sky), np.array(lights.ground)
-    directions = [_direction(light, lights.follow_camera, view) for light in pair]
-    colors = [[light.strength * channel for channel in light.color] for light in pair]
+    pair, follows = (lights.key, lights.rim), lights.follow_camera
     values = {
-        "u_light_directions": np.array(directions, dtype="f4").tobytes(),
-        "u_light_colors": np.array(colors, dtype="f4").tobytes(),
-        "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)]),
-        "u_ambient": tuple(0.5 * lights.ambient * (sky + ground)),
-        "u_ambient_growth": tuple(0.5 * lights.ambient * (sky - ground)),
+        "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)].tolist()),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
-        "u_to_studio": as_uniform(_studio_axes(view, lights.follow_camera)),
         "u_studio_strength": lights.studio,
+        **_colors(
+            tuple((*light.color, light.strength) for light in pair),
+            (*lights.sky, *lights.ground, lights.ambient),
+        ),
     }
+    if follows:
+        values["u_light_directions"] = _following(
+            tuple((light.azimuth, light.inclination) for light in pair)
+        )
+    else:
+        directions = [_direction(light, follows, view) for light in pair]
+        values["u_light_directions"] = np.array(directions, dtype="f4").tobytes()
+    if has_uniform(program, "u_to_studio"):
+        values["u_to_studio"] = as_uniform(_studio_axes(view, follows))
     set_uniforms(program, values)
     view.effects.bind(program, view.matrix)
+
+
+@lru_cache(maxsize=16)
+def _colors(
+    pair: tuple[tuple[float, ...], ...], surroundings: tuple[float, ...]
+) -> Mapping[str, object]:
+    """Return the uniforms of light colours; ``pair``: red, green, blue and strength of each light.
+
+    ``surroundings``: colours of the sky and the ground, and the strength of the ambient light.
+    """
+    sky, ground = np.array(surroundings[:3]), np.array(surroundings[3:6])
+    ambient = surroundings[6]
+    colors = [[strength * channel for channel in color] for *color, strength in pair]
+    return {
+        "u_light_colors": np.array(colors, dtype="f4").tobytes(),
+        "u_ambient": tuple((0.5 * ambient * (sky + ground)).tolist()),
+        "u_ambient_growth": tuple((0.5 * ambient * (sky - ground)).tolist()),
+    }
+
+
+@lru_cache(maxsize=16)
+def _following(pair: tuple[tuple[float, float], ...]) -> bytes:
+    """Return the directions of lights that follow the camera; ``pair``: their angles."""
+    return np.array([_in_camera(*angles) for angles in pair], dtype="f4").tobytes()
 
 
 def key_direction(view: View, lights: Lights) -> Floats:
@@ -185,13 +218,17 @@ def key_direction(view: View, lights: Lights) -> Floats:
 def _direction(light: Light, follows: bool, view: View) -> Floats:
     """Return the unit vector towards a light in camera space: (3,)."""
     if follows:
-        azimuth, inclination = math.radians(light.azimuth), math.radians(light.inclination)
-        flat = math.cos(inclination)
-        across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
-        return np.array([across, math.sin(inclination), towards])
+        return _in_camera(light.azimuth, light.inclination)
     # The light comes from the position of a camera at these angles.
     camera = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
     return view.matrix[:3, :3] @ camera_axes(camera)[2]
+
+
+def _in_camera(azimuth: float, inclination: float) -> Floats:
+    """Return the unit vector in camera space at angles, degrees, about its y and x axes: (3,)."""
+    azimuth, inclination = math.radians(azimuth), math.radians(inclination)
+    flat = math.cos(inclination)
+    return np.array([flat * math.sin(azimuth), math.sin(inclination), flat * math.cos(azimuth)])
 
 
 def _studio_axes(view: View, follows: bool) -> Floats:
@@ -205,5 +242,5 @@ def _studio_axes(view: View, follows: bool) -> Floats:
         level = axes[2] - (axes[2] @ up) * up
         level = level if np.linalg.norm(level) > 1e-6 else -np.sign(axes[2] @ up) * axes[1]
         back = level / np.linalg.norm(level)
-        front = np.stack([np.cross(up, back), up, back])
+        front = np.stack([cross(up, back), up, back])
     return front @ axes.T

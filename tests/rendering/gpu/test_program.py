@@ -2,6 +2,8 @@
 
 import shutil
 
+import moderngl
+import numpy as np
 import pytest
 
 from viewer.errors import RenderError
@@ -152,3 +154,26 @@ def test_uniforms_dropped_by_the_compiler_are_skipped(ctx):
     set_uniforms(line, {"u_no_such_thing": 1.0, "u_line_color": (0.25, 0.5, 0.75, 1.0)})
     assert line["u_line_color"].value == (0.25, 0.5, 0.75, 1.0)
     programs.release()
+
+
+def test_uniforms_are_written_only_if_their_program_has_other_values(ctx, monkeypatch):
+    written, write = [], moderngl.Uniform.write
+
+    def noting(uniform, data):
+        written.append(uniform.name)
+        write(uniform, data)
+
+    monkeypatch.setattr(moderngl.Uniform, "write", noting)
+    owners = Programs(ctx), Programs(ctx)
+    first, second = (programs.drawing("line") for programs in owners)
+    near, far = (np.diag([1.0, 1.0, depth, 1.0]).astype("f4").tobytes() for depth in (1.0, 2.0))
+    for length, matrix in ((1.0, near), (1.0, near), (2.0, near), (2.0, far), (1.0, near)):
+        set_uniforms(first, {"u_length": length, "u_projection": matrix})
+        assert first["u_length"].value == length and first["u_projection"].read() == matrix
+    both = ["u_length", "u_projection"]
+    assert written == [*both, "u_length", "u_projection", *both]
+    # Another program, here of the same shaders, has values of its own.
+    set_uniforms(second, {"u_length": 1.0, "u_projection": near})
+    assert written[6:] == both and second["u_length"].value == 1.0
+    for programs in owners:
+        programs.release()

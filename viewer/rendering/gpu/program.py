@@ -32,6 +32,9 @@ STORAGE_VERSION = 430
 RESTS_BINDING, POSED_BINDING = 0, 1
 """Bindings of the storage buffers of ``skin.vert`` and ``mesh.vert``."""
 
+_UNUSED = object()
+"""Value of uniforms that a program does not have."""
+
 _STORAGE_MACROS = {"INSTANCED", "REST_ROWS"}  # macros of shaders that read storage buffers
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
@@ -44,16 +47,35 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 def set_uniforms(
     program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, object]
 ) -> None:
-    """Set uniforms by name; uniforms that the compiler removed as unused are skipped."""
+    """Set uniforms by name; uniforms that the compiler removed as unused are skipped.
+
+    Values that the program already has are not written again. So uniforms are set only here, and
+    values are numbers, bytes or tuples, which nobody changes afterwards.
+    """
+    # The values belong to the program, which keeps them until it is freed.
+    if program.extra is None:
+        program.extra = {}
+    written: dict[str, object] = program.extra
     for name, value in values.items():
+        last = written.get(name)
+        if last is _UNUSED or last == value:
+            continue
         # Not ``name in program``, which compares the names of all members one by one.
         uniform = program.get(name, None)
-        if isinstance(uniform, moderngl.Uniform):
-            if isinstance(value, bytes):
-                # Compilers remove the unused end of an array.
-                uniform.write(value[: 4 * uniform.dimension * uniform.array_length])
-            else:
-                uniform.value = value
+        if not isinstance(uniform, moderngl.Uniform):
+            written[name] = _UNUSED
+            continue
+        if isinstance(value, bytes):
+            # Compilers remove the unused end of an array.
+            uniform.write(value[: 4 * uniform.dimension * uniform.array_length])
+        else:
+            uniform.value = value
+        written[name] = value
+
+
+def has_uniform(program: moderngl.Program, name: str) -> bool:
+    """Return whether a program uses a uniform, whose value may take time to compute."""
+    return program.get(name, None) is not None
 
 
 class Programs:

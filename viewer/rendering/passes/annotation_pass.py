@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.gpu.vertex_arrays import InstanceRows
 from viewer.rendering.overlay.annotation import Annotation, leader_lines, letters_for, place_labels
@@ -91,8 +91,7 @@ class _LabelPass:
         shown = np.array([text in self._places for text in texts])
         sources = np.array([self._places.get(text, (0, 0)) for text in texts])
         self._rows.write(np.hstack([corners, sources, lettering.sizes(texts), colors])[shown])
-        self._program["u_picture"] = size
-        self._program["u_texture"] = 0
+        set_uniforms(self._program, {"u_picture": size, "u_texture": 0})
         self._texture.use(0)
         with without_depth_test(self.context):
             self._rows.draw()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from functools import lru_cache
 
 import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.draw_state import behind, without_depth_writes
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import parse_color
 from viewer.rendering.view import View, set_model
@@ -44,24 +46,11 @@ class GroundPass:
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
         """Draw the grid under a box, (2, 3), which defines the grid's height, step and extent."""
         program = self.programs.drawing("ground")
-        step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
-        axes = ground_axes(view.camera.up)
-        center = box.mean(axis=0)
-        # The square is centred on a crossing of lines near the box, so that float32 keeps its
-        # precision.
-        cells = np.round(axes[:2] @ center / step)
-        height = (axes[2] @ box.T).min()
-        placement = np.eye(4)
-        placement[:3, :3] = axes.T
-        origin = axes.T @ np.array([*(cells * step), height])
-        placement[:3, 3] = origin
+        placement, values = _grid(tuple(box.ravel().tolist()), view.camera.up)
         set_model(program, view, placement, np.zeros(3))
-        program["u_extent"], program["u_fade"] = extent, extent
-        program["u_step"] = step
-        # Every tenth line is stronger, counted from the scene's origin.
-        program["u_origin"] = tuple(np.fmod(-cells, 10.0))
         dark = background.startswith("#") and sum(parse_color(background)) < 1.2
-        program["u_line_color"] = _LINE_ON_DARK if dark else _LINE_COLOR
+        color = _LINE_ON_DARK if dark else _LINE_COLOR
+        set_uniforms(program, {**values, "u_line_color": color})
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
             self._ground = self.context.vertex_array(program, content)
@@ -75,6 +64,25 @@ class GroundPass:
         for item in (self._ground, self._corners):
             if item is not None:
                 item.release()
+
+
+@lru_cache(maxsize=16)
+def _grid(corners: tuple[float, ...], up: Up) -> tuple[Floats, Mapping[str, object]]:
+    """Return the placement, (4, 4), and the uniforms of the grid; ``corners``: those of its box."""
+    box = np.array(corners).reshape(2, 3)
+    step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
+    axes = ground_axes(up)
+    # The square is centred on a crossing of lines near the box, so that float32 keeps its
+    # precision.
+    cells = np.round(axes[:2] @ box.mean(axis=0) / step)
+    height = (axes[2] @ box.T).min()
+    placement = np.eye(4)
+    placement[:3, :3] = axes.T
+    placement[:3, 3] = axes.T @ np.array([*(cells * step), height])
+    # Every tenth line is stronger, counted from the scene's origin.
+    origin = tuple(np.fmod(-cells, 10.0).tolist())
+    values = {"u_extent": extent, "u_fade": extent, "u_step": step, "u_origin": origin}
+    return placement, values
 
 
 def ground_axes(up: Up) -> Floats:

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.overlay.legend import Legend, legend_pixels
 
 _MARGIN = 0.014  # margin of the legend, as a fraction of the image height
@@ -39,10 +39,13 @@ class LegendPass:
         if self._texture is None:
             return False
         margin = max(round(_MARGIN * size[1]), 2)
-        self._program["u_place"] = margin, size[1] - margin - self._texture.height
-        self._program["u_extent"] = self._texture.size
-        self._program["u_picture"] = size
-        self._program["u_texture"] = 0
+        values = {
+            "u_place": (margin, size[1] - margin - self._texture.height),
+            "u_extent": self._texture.size,
+            "u_picture": size,
+            "u_texture": 0,
+        }
+        set_uniforms(self._program, values)
         self._texture.use(0)
         with without_depth_test(self.context):
             self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)

@@ -184,7 +184,7 @@ class MeshPass:
         """Draw the edges of all triangles over the surface."""
         program = self.programs.drawing("edge", fragment="line")
         set_model(program, view, placement, mesh.center)
-        program["u_line_color"] = _premultiplied(_EDGE_COLOR, opacity)
+        set_uniforms(program, {"u_line_color": _premultiplied(_EDGE_COLOR, opacity)})
         self.context.wireframe = True
         indices = mesh.index_set(options, as_listed=True)
         array = self.array(mesh, program, indices)
@@ -198,8 +198,8 @@ class MeshPass:
         """Draw a line along every vertex normal; ``size`` is the figure's size."""
         program = self.programs.drawing("line")
         set_model(program, view, placement, mesh.center)
-        program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
-        program["u_length"] = _NORMAL_LENGTH * size
+        color = _premultiplied(_NORMAL_COLOR, opacity)
+        set_uniforms(program, {"u_line_color": color, "u_length": _NORMAL_LENGTH * size})
         shown = mesh.mesh.lines_shown(mesh.hidden_parts)
         content = [
             (mesh.posed, "3f4 3f4/i", "in_position", "in_normal"),

@@ -54,7 +54,7 @@ def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
     # stays finite if A is singular. Its sign is changed to the sign of the inverse transpose, so
     # that outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
     # reverses the winding, not the normals).
-    cofactors = _cross(b, c), _cross(c, a), _cross(a, b)
+    cofactors = cross(b, c), cross(c, a), cross(a, b)
     x, y, z = np.ascontiguousarray(normals.T)
     moved = cofactors[0] * x + cofactors[1] * y + cofactors[2] * z
     # a . (b x c) is the determinant.
@@ -62,8 +62,8 @@ def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
     return np.where(reflected, -moved, moved).T
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    """Return cross products of (3, N) vectors; ``numpy.cross`` is slow along the first axis."""
-    return np.stack(
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return cross products of (3,) or (3, N) vectors, for which ``numpy.cross`` is slow."""
+    return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
