@@ -18,6 +18,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Shell
 from viewer.rig.kinematics import posed_skeleton
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin, skin_rows
@@ -29,6 +30,7 @@ Region = tuple[int, int, int, int]
 _MARGIN = 2  # margin in pixels around openings, for the rounding of the rasterizer
 # Maximum fraction of the image covered by openings for which a second draw is faster.
 _LARGEST = 0.25
+_closed: Memo[Figure, bool] = Memo()
 
 
 class BackFaces:
@@ -107,8 +109,10 @@ def is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
     """Return whether coincident vertices still coincide before skinning."""
     if not len(shell.copies):
         return True
-    corrected = how.correctives and figure.correctives is not None
-    return not corrected and shell.is_closed(figure.require_mesh().positions)
+    if how.correctives and figure.correctives is not None:
+        return False
+    # The shells of a figure are equal.
+    return _closed.get(figure, None, lambda: shell.is_closed(figure.require_mesh().positions))
 
 
 def _has_one_side(figure: Figure, pose: Pose) -> bool:

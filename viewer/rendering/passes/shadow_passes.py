@@ -22,7 +22,7 @@ from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, light_axes, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import cross, unit
 
 # The key light's shadow map.
 _SIDES = 256, 2048  # minimum and maximum number of texels on each side of a shadow map
@@ -216,7 +216,7 @@ class GroundShadowPass:
         placement = np.eye(4)
         placement[:3, 0], placement[:3, 1] = first, second
         # Only the direction matters: the product of two sides would exceed the range of float32.
-        placement[:3, 2] = np.cross(unit(first), unit(second))
+        placement[:3, 2] = cross(unit(first), unit(second))
         placement[:3, 3] = origin
         set_model(program, view, placement, np.zeros(3))
         array = self._arrays.get(program, lambda: [(self._corners, "2f4", "in_corner")])
