@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from viewer.rendering.camera import Camera
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rig.blendshapes import BlendShapes
+    from viewer.rig.comparison.pose_errors import PoseErrors, pose_errors
     from viewer.rig.figure import Figure
     from viewer.rig.material import Material, Texture
     from viewer.rig.mesh import Mesh
@@ -61,6 +62,7 @@ __all__ = [
     "Mesh",
     "MotionArrays",
     "Pose",
+    "PoseErrors",
     "PoseRecord",
     "Report",
     "Scene",
@@ -84,6 +86,7 @@ __all__ = [
     "mirror_pose",
     "motion",
     "onion",
+    "pose_errors",
     "record_of",
     "render",
     "rest_pose",
@@ -110,6 +113,7 @@ _HOMES = {
     "Mesh": "rig.mesh",
     "MotionArrays": "rig.motion.motion_arrays",
     "Pose": "rig.pose",
+    "PoseErrors": "rig.comparison.pose_errors",
     "PoseRecord": "rig.posing.pose_record",
     "Report": "batching.report",
     "Scene": "rig.scene",
@@ -133,6 +137,7 @@ _HOMES = {
     "mirror_pose": "rig.retargeting.mirror",
     "motion": "rig.motion.motion_arrays",
     "onion": "rig.motion.onion",
+    "pose_errors": "rig.comparison.pose_errors",
     "record_of": "rig.posing.pose_record",
     "render": "commands._pictures",
     "rest_pose": "rig.pose",

@@ -118,5 +118,5 @@ def test_videos_that_cannot_be_recorded_are_refused(tmp_path, name, settings, me
 
 
 def test_still_scenes_need_a_turntable(tmp_path):
-    with pytest.raises(ViewerError, match="^nothing moves: "):
+    with pytest.raises(ViewerError, match=r"^nothing moves: "):
         viewer.video(viewer.load(), tmp_path / "a.mp4", SIZE)

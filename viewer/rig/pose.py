@@ -205,7 +205,8 @@ class _Factor:
     def at(self, dofs: Floats) -> Floats:
         """Return the rotations at DOFs (..., D): (..., N, 3, 3)."""
         angles = dofs[..., self.rows, None]
-        entries = self.constant + np.cos(angles) * self.cosines
+        entries = np.cos(angles) * self.cosines
+        entries += self.constant
         entries += np.sin(angles) * self.sines
         return entries.reshape(*entries.shape[:-1], 3, 3)
 
