@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.autorig.alignment.orientation_search import AXES
-from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import DEFAULT_UP, AlignmentSettings
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
@@ -56,6 +56,7 @@ from viewer.phrases import printable, rounded
 from viewer.progress import part_of_work
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import Up
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -187,7 +188,7 @@ def run(arguments: argparse.Namespace) -> int:
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
-    settings = _settings(arguments, template, output)
+    settings = _settings(arguments, template, output, target.up)
     clips = _read_clips(arguments.clips, output, template_files, template.figure, frames.fps)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
@@ -275,11 +276,9 @@ def _template(
             "another --from, as in --from body --from walk.npz"
         )
     only_skeleton = option == "--skeleton"
-    if only_skeleton and not frames.is_one:
-        # The joints are where the file has them, not where its motion begins.
+    if not frames.is_one:
         for actor in scene.actors:
-            if actor.figure.skeleton is not None:
-                actor.pose = figure_pose(actor.figure)
+            _put_at_rest(actor)
     print_warnings([*scene.diagnostics, *apply_pose(scene, pose, frames)])
     found = [
         actor
@@ -302,6 +301,16 @@ def _has_skeleton(scene: Scene) -> bool:
     return any(actor.figure.skeleton is not None for actor in scene.actors)
 
 
+def _put_at_rest(actor: Actor) -> None:
+    """Replace the first pose of a motion, which rarely resembles an unposed mesh, by rest."""
+    if actor.clip is None or actor.pose is None or actor.figure.skeleton is None:
+        return
+    shape = actor.pose.shape_weights
+    actor.pose = figure_pose(actor.figure)
+    actor.pose.shape_weights = shape
+    actor.is_present = True
+
+
 def _template_files(name: str) -> list[Path]:
     path, *others = named_files(name)
     near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
@@ -311,9 +320,11 @@ def _template_files(name: str) -> list[Path]:
 
 
 def _settings(
-    arguments: argparse.Namespace, template: Actor, output: Path | None
+    arguments: argparse.Namespace, template: Actor, output: Path | None, target_up: Up
 ) -> TransferSettings:
     """Return the requested settings; the .skel format cannot store correctives."""
+    if arguments.up is None and target_up != DEFAULT_UP:
+        arguments.up = target_up  # the file says so
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)

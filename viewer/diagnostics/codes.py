@@ -241,8 +241,8 @@ CODES: dict[str, Code] = {
     "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
     "R004": Code(
         "warning",
-        "poor fit of pose or proportions",
-        "choose a template of the same kind as the target",
+        "poor fit of pose or proportions, or front and back that look alike",
+        "choose a template of the same kind as the target, or specify --facing",
     ),
     "R005": Code("note", "matched weights", "none if most vertices are matched"),
     "R006": Code(

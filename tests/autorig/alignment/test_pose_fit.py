@@ -8,7 +8,13 @@ from autorig.rigged_shapes import arm, turn
 from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment.icp import Triangles
-from viewer.autorig.alignment.pose_fit import AlignedTemplate, Pairs, fit_pose, solve_step
+from viewer.autorig.alignment.pose_fit import (
+    AlignedTemplate,
+    Pairs,
+    fit_pose,
+    solve_step,
+    start_of,
+)
 from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.progress import receiving
@@ -27,7 +33,7 @@ def fitted(target_figure, target_pose, figure, scales=True):
     pose = rest_pose(figure.skeleton)
     fractions = []
     with receiving(lambda done, total, unit, what: fractions.append(done / total)):
-        found = fit_pose(figure, pose, START, side, side, scales)
+        found = fit_pose(figure, start_of(figure, pose, START), side, side, scales)
     assert fractions == sorted(fractions) and fractions[0] == 0.0
     assert (pose.dofs == rest_pose(figure.skeleton).dofs).all()
     aligned = found.similarity.apply(deform(found.figure, found.pose)[0])
@@ -85,7 +91,7 @@ def test_too_few_pairs_do_not_change_the_template():
     far = START.apply(deform(figure)[0]) + 1000.0
     side = Triangles(far, figure.mesh.triangles, 500)
     pose = rest_pose(figure.skeleton)
-    found = fit_pose(figure, pose, START, side, side, True)
+    found = fit_pose(figure, start_of(figure, pose, START), side, side, True)
     assert found.similarity is START
     assert (found.pose.dofs == pose.dofs).all() and not found.rotated.any()
 

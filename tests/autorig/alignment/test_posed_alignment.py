@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from autorig.rigged_shapes import arm, mesh_of, turn
+from autorig.rigged_shapes import arm, mesh_of
 from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment import posed_alignment
@@ -109,35 +109,6 @@ def test_axis_scales_keep_the_pose():
     assert found.pose is own and found.figure is figure
 
 
-@pytest.mark.parametrize("own", [False, True])
-def test_stretched_target_gets_a_scale_along_each_axis(own):
-    figure = load(bundled_body()).actors[0].figure
-    target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
-    whose, cure = "the target's", "use --scale axes"
-    rotation = np.eye(3)
-    if own:
-        whose, cure = "its own", "fit proportions"
-        rotation = turn([0, 1, 0], 0.5)
-        target = mesh_of(target.positions @ rotation.T, target.triangles)
-    found, pose = aligned(figure, target, samples=250)
-    assert found.alignment.how == "fit" and found.pose is pose
-    wanted = rotation @ np.diag([1.3, 1.0, 0.8])
-    assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
-    assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
-        f"proportions: template stretched by N, N, N along {whose} x, y and z, pose kept",
-        "result: a gap of N % of the size (N % before)",
-    ]
-    unfitted, _ = aligned(figure, target, fits=False, samples=250)
-    (line,) = unfitted.lines
-    found = re.fullmatch(
-        rf"warning: the template fits much better if stretched by (.+) along {whose} x, y and z "
-        r"\(0\.\d+ % of the size apart instead of \d\.\d+ %\): (.+) if the target was stretched",
-        line.labelled,
-    )
-    assert_allclose([float(each) for each in found[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
-    assert found[2] == cure
-
-
 def test_known_scales_are_not_searched():
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
@@ -183,7 +154,7 @@ def fit_of(figure, pose, angle):
 def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):
     figure, _, mesh = bent(target)
     half = bent(reached)[1]
-    monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
+    monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_, **__: fit_of(figure, half, reached))
     found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False, samples=250)
     assert tuple(re.sub(r"\d+\.\d+", "G", line.labelled) for line in found.lines) == lines
     assert (found.pose is own) == ("not fitted" in lines[0])
@@ -196,7 +167,7 @@ def test_progress_increases_and_cancels():
 
     def receive(done, total, unit, what):
         fractions.append(done / total)
-        if what == "fitting pose and proportions" and done > 60:
+        if what == "fitting pose and proportions" and done > 45:
             raise Cancelled
 
     with pytest.raises(Cancelled), receiving(receive):

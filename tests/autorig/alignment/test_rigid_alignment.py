@@ -47,20 +47,6 @@ def test_tilted_rotation_is_corrected():
     assert_allclose(found.shift, [0.01, 0.02, -0.01], atol=1e-6)
 
 
-def test_axes_may_be_those_of_the_template():
-    rotation = turn([1, 2, -1], 0.9)
-    positions, triangles = tube()
-    moved = positions * FACTORS @ rotation.T
-    template, target = (Triangles(each, triangles, 800) for each in (positions, moved))
-    start = Similarity(1.0, turn([1, 2, -1], 0.85), np.zeros(3), np.ones(3))
-    found = fit_axes(template, target, start, 40, rotations=True, own=True)
-    assert_allclose(found.scale * found.own_factors, FACTORS, atol=1e-6)
-    assert_allclose(found.rotation, rotation, atol=1e-6)
-    assert (found.factors == 1.0).all()
-    assert_allclose(found.apply(positions), moved, atol=1e-6)
-    assert_allclose(found.undo(moved), positions, atol=1e-6)
-
-
 def test_rotation_is_kept_unless_requested():
     template, target = stretched_sides(turn([1, 2, -1], 0.12))
     assert (fit_axes(template, target, START, 10).rotation == np.eye(3)).all()

@@ -23,7 +23,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 
 # Messages about the fit of the template, which remain valid when it is moved.
-_DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")
+_DONE = ("R003.pose", "R003.not-fitted")
 _GAP = 1.25  # distance between target and template side by side, relative to their mean width
 
 

@@ -158,7 +158,7 @@ class RigChoices:
 
     up: str = setting("", choices=_AXES)
     facing: str = setting("", choices=_AXES)
-    """Up and forward axes of the target; empty to search for them."""
+    """Up and forward axes of the target; empty for those of its file and its feet."""
     scale: TemplateScale = setting(_USUAL.alignment.scale, choices=_SCALES)
     refines: bool = setting(_USUAL.alignment.refines)
     fits: bool = setting(_USUAL.fits)

@@ -31,7 +31,11 @@ from viewer.app.rigging.rigging import (
 )
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.alignment.surface_alignment import AlignmentSettings, alignment_lines
+from viewer.autorig.alignment.surface_alignment import (
+    DEFAULT_UP,
+    AlignmentSettings,
+    alignment_lines,
+)
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.pipeline import transfer
@@ -169,7 +173,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
     """Align the template with the target, by a search unless settings are given."""
     choices, target = state.of(Rigging).choices, target_mesh(state)
     take = _snapshot(state, aligned=settings is not None)
-    how = settings or _search_settings(choices)
+    how = settings or _search_settings(state)
     own = current_template(state)
     fits = choices.fits and how.matrix is None
     asked = state.of(Rigging).placing
@@ -198,9 +202,11 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
     _begin(state, "Aligning", act)
 
 
-def _search_settings(choices: RigChoices) -> AlignmentSettings:
+def _search_settings(state: AppState) -> AlignmentSettings:
+    choices, target = state.of(Rigging).choices, state.of(Rigging).target
+    stated = "" if target is None or target.figure.up == DEFAULT_UP else target.figure.up
     return AlignmentSettings(
-        up=choices.up or None,
+        up=choices.up or stated or None,
         facing=choices.facing or None,
         scale=choices.scale,
         refines=choices.refines,
@@ -252,13 +258,14 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
         return
     take, mesh, name = _snapshot(state, aligned=True), target_mesh(state), target.title
     place, own = target_place(target), current_template(state)
+    searched = _search_settings(state)
 
     def act() -> _Finish:
         report(0, 100, "", f"Preparing {printable(name, 40)}")
         template, found, start = take(), placing, 0.0
         aligned = template
         if found is None and "robust" in methods:
-            start, how = 0.4, _search_settings(choices)
+            start, how = 0.4, searched
             with part_of_work("Aligning", (0.0, start)):
                 found = align_template(template, own or template, mesh, how, choices.fits)
             aligned = found.fitted or template

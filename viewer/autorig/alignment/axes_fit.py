@@ -1,4 +1,4 @@
-"""Alignment with a separate scale along each axis of target or template, for stretched meshes."""
+"""Alignment with a separate scale along each axis of the target, for stretched meshes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ def fit_axes(
     start: Similarity,
     rounds: int,
     rotations: bool = False,
-    own: bool = False,
 ) -> Similarity:
     """Fit a separate scale along each axis.
 
@@ -31,10 +30,9 @@ def fit_axes(
             break
         before = scales
         # Minimise sum (n . (x - q))^2 + 1e-5 |x - q|^2 over factors f, a shift t and, optionally, a
-        # small rotation w, with x = f R p + f' (w x R p) + t, or with the template's own axes
-        # x = R f p + w x R f' p + t. f' are the current factors: with f there, the products of f
-        # and w would not be linear.
-        columns = _columns(pairs.points, similarity.rotation, before, rotations, own)
+        # small rotation w, with x = f R p + f' (w x R p) + t. f' are the current factors: with f
+        # there, the products of f and w would not be linear.
+        columns = _columns(pairs.points, similarity.rotation, before, rotations)
         found, vector, shift = _solved(pairs, columns)
         if (found <= 0.0).any():
             break
@@ -42,24 +40,16 @@ def fit_axes(
         # The geometric mean is the common scale, so that the product of the factors is 1.
         scale = float(np.cbrt(np.prod(scales)))
         rotation = rotation_vector_to_matrix(vector) @ similarity.rotation
-        factors, own_factors = np.ones(3), np.ones(3)
-        (own_factors if own else factors)[:] = scales / scale
-        similarity = Similarity(scale, rotation, shift, factors, own_factors)
+        similarity = Similarity(scale, rotation, shift, scales / scale)
         if max(np.abs(scales / before - 1.0).max(), float(np.linalg.norm(vector))) < SETTLED:
             break
     return similarity
 
 
-def _columns(
-    points: Floats, rotation: Floats, before: Floats, rotations: bool, own: bool
-) -> Floats:
+def _columns(points: Floats, rotation: Floats, before: Floats, rotations: bool) -> Floats:
     """Return the Jacobian of points by factors, shift and rotation: (N, 3, 6 or 9)."""
-    if own:
-        scaled = points[:, None, :] * rotation
-        arms, lift = (points * before) @ rotation.T, np.ones(3)
-    else:
-        arms, lift = points @ rotation.T, before
-        scaled = arms[:, :, None] * np.eye(3)
+    arms, lift = points @ rotation.T, before
+    scaled = arms[:, :, None] * np.eye(3)
     parts = [scaled, np.broadcast_to(np.eye(3), scaled.shape)]
     if rotations:
         x, y, z = arms.T

@@ -19,12 +19,15 @@ figure minimise the mean of::
     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
     h |x' - q|^2        over vertices and the target's points closest to them, in any direction
 
-The second sum constrains the ends of limbs, which planes do not. All lengths are divided by the
-target's size. Small penalties on rotations and growths, per step and in total, preserve what
-the surface does not determine, such as the rotation of a limb about its own axis.
+The second sum constrains the ends of limbs, which planes do not. Marks, vertices whose positions in
+the target are known, add a third sum of |x' - q|^2. All lengths are divided by the target's size.
+Small penalties on rotations and growths, per step and since the start, preserve what the surface
+does not determine, such as the rotation of a limb about its own axis.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,13 +55,14 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 from viewer.rig.skinning.lbs import move
 
 _ROUNDS = 32  # number of iterations
+_MARK_ROUNDS = 24  # number of iterations of a fit to marks only
 _NEARING = 16  # number of iterations over which the search radius shrinks
 _VERTICES = 1500  # number of template vertices that are matched with the target
 _FAR, _NEAR = 0.25, 0.03  # ratio of the search radius to the size, at the start and at the end
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 _STILL = 2e-3  # rotation in radians; iterations end when no joint rotates by more
 _FEWEST = 50  # minimum number of pairs for fitting a pose
-_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # limits of the logarithms of limb scales
+_SMALLEST, _LARGEST = np.log(0.2), np.log(5.0)  # limits of the logarithms of limb scales
 _HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
 
 # Penalties on the squares of total rotations (radians) and total growths (logarithms).
@@ -88,34 +92,84 @@ class Fitted:
     """(2, J). Logarithms of the scales along and across the limbs."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """Vertices of the template with known positions in the target."""
+
+    vertices: Ints
+    """(M,)."""
+    targets: Floats
+    """(M, 3)."""
+    weights: Floats
+    """(M,). Relative to each other; the mean over all marks counts as much as ``strength``."""
+    strength: float
+    """Weight relative to the sums over surfaces."""
+
+
+def start_of(template: Figure, pose: Pose, similarity: Similarity) -> Fitted:
+    """Return the state before any fit."""
+    n_joints = template.require_skeleton().n_joints
+    zeros = np.zeros((n_joints, 3)), np.zeros((2, n_joints))
+    return Fitted(template, pose.copy(), similarity, *zeros)
+
+
+def fit_marks(template: Figure, start: Fitted, limbs: Limbs, marks: Marks, size: float) -> Fitted:
+    """Rotate joints and scale limbs until marked vertices are at their positions."""
+    parents = template.require_skeleton().parents
+    state = start
+    for _ in range(_MARK_ROUNDS):
+        aligned = _aligned_template(state, limbs)
+        total = (state.rotated - start.rotated, state.grown - start.grown)
+        step = solve_step(aligned, limbs, parents, None, size, *total, True, marks)
+        state = _moved(template, limbs, state, step)
+        if np.abs(step.rotation_vectors).max(initial=0.0) < _STILL:
+            break
+    return state
+
+
 def fit_pose(
     template: Figure,
-    pose: Pose,
-    similarity: Similarity,
+    start: Fitted,
     far: Side,
     near: Side,
     scales: bool,
+    marks: Marks | None = None,
+    reach: float = _FAR,
+    fades: float = 1.0,
 ) -> Fitted:
-    """Rotate a template's joints and scale its limbs, both sides alike, to match the target."""
+    """Rotate a template's joints and scale its limbs, both sides alike, to match the target.
+
+    ``reach``: search radius at the beginning over the size, smaller if the start is close.
+    ``fades``: fraction of the marks' strength at the end.
+    """
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
     chosen = even_vertices(mesh.positions, mesh.triangles, _VERTICES)
-    rotated = np.zeros((skeleton.n_joints, 3))
-    state = Fitted(template, pose.copy(), similarity, rotated, np.zeros((2, skeleton.n_joints)))
+    state = start
     for number in range(_ROUNDS):
         report_fraction(number / _ROUNDS, "fitting pose and proportions")
         aligned = _aligned_template(state, limbs)
         late = min(number / _NEARING, 1.0)
         target = far if late < 1.0 else near
-        pairs = _pairs(aligned, chosen, target, target.size * _FAR * (_NEAR / _FAR) ** late)
+        pairs = _pairs(aligned, chosen, target, target.size * reach * (_NEAR / reach) ** late)
         if len(pairs.vertices) < _FEWEST:
             break
         parents, size = skeleton.parents, target.size
-        step = solve_step(aligned, limbs, parents, pairs, size, state.rotated, state.grown, scales)
+        total = (state.rotated - start.rotated, state.grown - start.grown)
+        faded = marks if marks is None else replace(marks, strength=marks.strength * fades**late)
+        step = solve_step(aligned, limbs, parents, pairs, size, *total, scales, faded)
         state = _moved(template, limbs, state, step)
         if late == 1.0 and np.abs(step.rotation_vectors).max(initial=0.0) < _STILL:
             break
     return state
+
+
+def aligned_positions(state: Fitted) -> Floats:
+    """Return the vertices of a fitted template in the target's frame: (V, 3)."""
+    mesh, skeleton, skin = state.figure.attached()
+    palette = skinning_matrices(world_matrices(skeleton, state.pose), skin.inverse_bind)
+    posed = move(mesh.positions, skin, palette)[0]
+    return state.similarity.apply(apply_transform(placement_matrix(state.pose), posed))
 
 
 def _aligned_template(state: Fitted, limbs: Limbs) -> AlignedTemplate:
@@ -141,7 +195,10 @@ def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -
     asked = target.samples
     from scipy import spatial
 
-    distances, nearest = spatial.cKDTree(aligned.positions).query(asked.positions)
+    # Marks inside the template have no normal.
+    surface = np.flatnonzero(aligned.normals.any(axis=1)).astype(np.int32)
+    distances, nearest = spatial.cKDTree(aligned.positions[surface]).query(asked.positions)
+    nearest = surface[nearest]
     same_way = np.einsum("na,na->n", asked.normals, aligned.normals[nearest]) >= _SAME_WAY
     towards = (distances <= reach) & same_way
     away = near & facing
@@ -252,24 +309,42 @@ def solve_step(
     aligned: AlignedTemplate,
     limbs: Limbs,
     parents: Ints,
-    pairs: Pairs,
+    pairs: Pairs | None,
     size: float,
     rotated: Floats,
     grown: Floats,
     scales: bool,
+    marks: Marks | None = None,
 ) -> PoseStep:
-    """Solve the linear problem above after rotations (J, 3) and growths (2, J) in total."""
-    middle = aligned.positions[pairs.vertices].mean(axis=0)
-    frame = _Frame(middle, size, aligned, limbs, parents)
-    matrix, right = _equations(frame, pairs.vertices, pairs.targets, pairs.normals)
-    for axis in np.eye(3):
-        normals = np.broadcast_to(axis, pairs.end_targets.shape)
-        more, values = _equations(frame, pairs.ends, pairs.end_targets, normals)
-        matrix += _HOLD * more
-        right += _HOLD * values
-    count, n_joints = len(pairs.vertices), len(parents)
+    """Solve the linear problem above after rotations (J, 3) and growths (2, J) in total.
+
+    Without ``pairs``, only the marks count.
+    """
+    n_joints = len(parents)
     below = np.flatnonzero(parents >= 0)
-    matrix, right = matrix / count, right / count
+    known = pairs.vertices if pairs is not None else marks.vertices if marks is not None else None
+    assert known is not None  # one of them is given
+    middle = aligned.positions[known].mean(axis=0)
+    frame = _Frame(middle, size, aligned, limbs, parents)
+    count = 7 + 3 * len(below) + 2 * n_joints
+    matrix, right = np.zeros((count, count)), np.zeros(count)
+    if pairs is not None:
+        matrix, right = _equations(frame, pairs.vertices, pairs.targets, pairs.normals)
+        for axis in np.eye(3):
+            normals = np.broadcast_to(axis, pairs.end_targets.shape)
+            more, values = _equations(frame, pairs.ends, pairs.end_targets, normals)
+            matrix += _HOLD * more
+            right += _HOLD * values
+        matrix, right = matrix / len(pairs.vertices), right / len(pairs.vertices)
+    if marks is not None:
+        factor = marks.strength / float(marks.weights.sum())
+        for axis in np.eye(3):
+            normals = np.broadcast_to(axis, marks.targets.shape)
+            more, values = _equations(
+                frame, marks.vertices, marks.targets, normals, np.sqrt(factor * marks.weights)
+            )
+            matrix += more
+            right += values
     penalty = _penalties(len(below), n_joints)
     right[7:] -= penalty @ np.concatenate([rotated[below].ravel(), grown.ravel()])
     matrix[7:, 7:] += penalty
@@ -300,9 +375,16 @@ def _penalties(n_rotating: int, n_joints: int) -> Floats:
 
 
 def _equations(
-    frame: _Frame, vertices: Ints, targets: Floats, normals: Floats
+    frame: _Frame,
+    vertices: Ints,
+    targets: Floats,
+    normals: Floats,
+    weights: Floats | None = None,
 ) -> tuple[Floats, Floats]:
-    """Return the normal equations of n . (x' - q) = 0, with columns in the above order."""
+    """Return the normal equations of n . (x' - q) = 0, with columns in the above order.
+
+    ``weights``: (N,), factors of the equations.
+    """
     x = frame.aligned.positions[vertices]
     count = len(x)
     arms = (x - frame.middle) / frame.size
@@ -320,6 +402,8 @@ def _equations(
         axis=1,
     )
     gaps = np.einsum("na,na->n", normals, targets - x) / frame.size
+    if weights is not None:
+        rows, gaps = rows * weights[:, None], gaps * weights
     return rows.T @ rows, rows.T @ gaps
 
 

@@ -2,9 +2,10 @@
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
 similarity aligns one with the other. If the alignment leaves a large error, pose and proportions
-are therefore fitted too, and the fit is accepted if it removes most of the error. A figure in a
-different pose also looks nearly the same from behind: if the alignment is ambiguous, both facings
-are fitted.
+are therefore fitted too: from that alignment, and from the limbs of the target (``anatomy_fit``) if
+it has those of the template. The fit with the least distance between the surfaces, in both
+directions, is accepted if it removes most of the error. Feet decide which way a figure faces; if
+they are stumps, both facings are fitted.
 """
 
 from __future__ import annotations
@@ -13,24 +14,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.axes_fit import fit_axes
+from viewer.autorig.alignment.anatomy_fit import Start, starts_of, template_body
 from viewer.autorig.alignment.icp import Cloud, Triangles, iterate
 from viewer.autorig.alignment.orientation_search import axis_direction
-from viewer.autorig.alignment.pose_fit import Fitted, fit_pose
+from viewer.autorig.alignment.pose_fit import Fitted, fit_pose, start_of
+from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import (
+    DEFAULT_UP,
     PART,
+    AlignedBy,
     Alignment,
     AlignmentSettings,
     Posed,
     align,
     misfit,
 )
+from viewer.autorig.anatomy import anatomy_of
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
-from viewer.phrases import Remedy, rounded
-from viewer.progress import part_of_work, report_fraction
+from viewer.phrases import Remedy
+from viewer.progress import part_of_work
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -47,15 +52,17 @@ _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first value, after a joint was rotated by more than the second, indicates a
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_SURE = 0.004  # ratio of misfit after the fit to size up to which the opposite facing is not tried
-_ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
-_CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach after the fit
 _ROUNDS = 30  # number of iterations to align the template facing the other way
-_AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # origins of alignments that were not given by the user
-# Separate scales are tried if the error exceeds the first value, and accepted if they reduce it to
-# at most the second fraction and differ by more than the third value.
-_STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
+
+_FACING = Remedy("Facing", "--facing")
+_CLEARLY = 0.85  # fraction of the misfit that an unusual facing must reach
+_MOST_STARTS = 2  # starts from anatomy that are fitted to the surface
+_NEARBY = 0.08  # ratio of the search radius to the size at the beginning of such a fit
+_CLOSER = 0.03  # the same ratio for a fit to the surface only
+# Strength of the points of the anatomy relative to the surface, and the fraction left at the end.
+_MARKED, _FADES = 0.3, 0.1
+_ALIKE = "R004.facing: front and back look alike: check the front, or specify {remedy}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,49 +113,125 @@ def align_posed(
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # outward normals distinguish the two sides of a limb
     theirs = Posed(target.positions, triangles)
-    with part_of_work(span=(0.0, 0.5)):
+    with part_of_work(span=(0.0, 0.3)):
         rigid = align(ours, theirs, template.up, settings)
     kept = PosedAlignment(rigid, template, pose, posed, ())
-    is_part = rigid.away > PART
-    gap = misfit(rigid, is_part)
-    if settings.scale == "axes" or gap <= min(_CLOSE, _STRETCH_GAP):
+    gap = misfit(rigid, rigid.away > PART)
+    if settings.scale == "axes" or gap <= _CLOSE or not fits:
         return kept
     exact = Triangles(target.positions, triangles, settings.samples)
-    stretched = None
-    if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
-        report_fraction(0.5, "proportions")
-        stretched = _stretched(ours, exact, kept, settings.samples)
-        if fits and stretched is not None and misfit(stretched.alignment, False) <= _STRETCH_GAP:
-            return stretched
-    if fits and gap > _CLOSE:
-        dense = sample_surface(target.positions, triangles, settings.dense)
-        scales = settings.scale != "none" and not is_part
-        job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales, settings)
-        kept = _if_better(job, ours, kept)
-    if stretched is None or not _is_closer(stretched, kept):
-        return kept
-    return stretched if fits else replace(kept, lines=(_advice(stretched, kept),))
+    dense = sample_surface(target.positions, triangles, settings.dense)
+    cloud = Cloud(exact.samples, dense)
+    scales = settings.scale != "none"
+    job = _Job(template, pose, cloud, exact, scales, settings)
+    starts: list[Start] = []
+    if rigid.how in _FOUND and scales:
+        with part_of_work(span=(0.3, 0.45)):
+            starts = _starts(job, ours, theirs)
+    return _best(job, ours, kept, starts)
+
+
+def _starts(job: _Job, ours: Posed, theirs: Posed) -> list[Start]:
+    """Return the starts from anatomy, none if template or target has no two pairs of limbs."""
+    with part_of_work(span=(0.0, 0.4)):
+        body = template_body(job.template, job.pose, ours.positions)
+    if body is None:
+        return []
+    settings = job.settings
+    up = axis_direction(settings.up or DEFAULT_UP)
+    front = None if settings.facing is None else axis_direction(settings.facing)
+    lateral = None if front is None else np.cross(up, front)
+    with part_of_work(span=(0.4, 0.8)):
+        target = anatomy_of(theirs.positions, theirs.triangles, up, lateral)
+    with part_of_work(span=(0.8, 1.0)):
+        return starts_of(body, target, front)
+
+
+def _best(job: _Job, ours: Posed, kept: PosedAlignment, starts: list[Start]) -> PosedAlignment:
+    """Return the closest of all fits if it removes most of the error."""
+    rigid = kept.alignment
+    fits = _fits_of_limbs(job, starts)
+    # Only a whole figure has all limbs of the template where they should be.
+    whole = [(start, fit) for start, fit in fits if fit.alignment.away <= PART]
+    is_part = rigid.away > PART and not whole
+    before = misfit(rigid, is_part)
+    best: PosedAlignment | None = None
+    if whole:
+        start, best = min(whole, key=lambda each: _doubtful_misfit(*each))
+        after = misfit(best.alignment, False)
+        lines = [*best.lines, note(wording.GAP, gap=_gap(after, before))]
+        if not start.is_sure:
+            lines.append(note(_ALIKE, remedy=_FACING))
+        best = replace(best, lines=tuple(lines))
+    with part_of_work(span=(0.8, 1.0)):
+        found = _fitted(job, _facing(job, ours, rigid, starts))
+    other = _if_better(kept, found, before, is_part)
+    if best is None:
+        return other
+    # A figure of another kind can be squeezed into any surface: its limbs count more.
+    limit = misfit(best.alignment, False)
+    limit = limit if limit <= _POOR else _CLEARLY * limit
+    return other if misfit(other.alignment, False) < limit else best
+
+
+def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[tuple[Start, PosedAlignment]]:
+    """Fit the starts that face the usual way, and the best one also facing the other way."""
+    usual = [start for start in starts if start.is_sure or start.is_usual] or starts
+    found = []
+    for number, start in enumerate(usual[:_MOST_STARTS]):
+        with part_of_work(span=(0.45 + 0.12 * number, 0.57 + 0.12 * number)):
+            found.append((start, _fitted_limbs(job, start)))
+    if found:
+        best = min(found, key=lambda each: _doubtful_misfit(*each))[0].plan
+        same = {id(best.lower), id(best.upper)}
+        for start in starts:
+            if start not in usual and {id(start.plan.lower), id(start.plan.upper)} == same:
+                with part_of_work(span=(0.69, 0.8)):
+                    found.append((start, _fitted_limbs(job, start)))
+    return found
+
+
+def _doubtful_misfit(start: Start, fit: PosedAlignment) -> float:
+    """Return the misfit, larger for an unusual facing that feet do not show."""
+    gap = misfit(fit.alignment, False)
+    return gap if start.is_sure or start.is_usual else gap / _CLEARLY
+
+
+def _facing(job: _Job, ours: Posed, rigid: Alignment, starts: list[Start]) -> Alignment:
+    """Return the alignment, reversed if all starts from anatomy face the other way."""
+    if rigid.how not in _FOUND or rigid.away > PART or not starts:
+        return rigid
+    # Columns of the rotations: the template's left and the starts' left in the target.
+    left = rigid.similarity.rotation @ np.cross(*_up_and_front(job.template.up))
+    if all(float(left @ start.plan.left) < 0.0 for start in starts):
+        return _facing_back(job, ours, rigid, job.template.up)
+    return rigid
+
+
+def _up_and_front(up: Up) -> tuple[Floats, Floats]:
+    return axis_direction(up), axis_direction("z" if up == "y" else "x")
+
+
+def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:
+    """Fit a template to the surface whose limbs are already where the target's are."""
+    marks = replace(start.marks, strength=_MARKED)
+    state = fit_pose(
+        start.marked, start.fitted, job.cloud, job.exact, True, marks, _NEARBY, fades=_FADES
+    )
+    figure = resized(job.template, limbs_of(job.template), *np.exp(state.grown))
+    state = replace(state, figure=figure)
+    found = _result(job, state, "fit")
+    if misfit(found.alignment, False) > _POOR:
+        return found
+    # The surface of a similar figure is a better guide to its joints than the anatomy.
+    state = fit_pose(job.template, state, job.exact, job.exact, True, reach=_CLOSER)
+    return _result(job, state, "fit")
 
 
 def _if_better(
-    job: _Job,
-    ours: Posed,
-    kept: PosedAlignment,
+    kept: PosedAlignment, found: PosedAlignment, before: float, is_part: bool
 ) -> PosedAlignment:
-    """Return the template with fitted pose and proportions if these remove most of the error."""
-    rigid = kept.alignment
-    is_part = rigid.away > PART
-    before = misfit(rigid, is_part)
-    with part_of_work(span=(0.5, 0.75)):
-        found = _fitted(job, rigid)
-    may_face_back = rigid.how in _FOUND and job.settings.facing is None and not is_part
-    if may_face_back and misfit(found.alignment, False) > _SURE:
-        behind = _facing_back(job, ours, rigid, job.template.up)
-        if misfit(behind, False) < _ALIKE * before:
-            with part_of_work(span=(0.75, 1.0)):
-                other = _fitted(job, behind)
-            if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
-                found = other
+    """Return the fitted template if it removes most of the error, the unchanged one otherwise."""
     after = misfit(found.alignment, is_part)
     bent, name = found.most_rotated
     gap = {"gap": _gap(after, before)}
@@ -186,10 +269,15 @@ def _if_better(
 
 def _fitted(job: _Job, start: Alignment) -> PosedAlignment:
     template = job.template
-    found = fit_pose(template, job.pose, start.similarity, job.cloud, job.exact, job.scales)
+    scales = job.scales and start.away <= PART
+    begun = start_of(template, job.pose, start.similarity)
+    found = fit_pose(template, begun, job.cloud, job.exact, scales)
+    return _result(job, found, start.how if start.how == "landmarks" else "fit")
+
+
+def _result(job: _Job, found: Fitted, how: AlignedBy) -> PosedAlignment:
     posed = deform(found.figure, found.pose)[0]
-    ours = Triangles(posed, template.require_mesh().triangles, job.settings.samples)
-    how = start.how if start.how == "landmarks" else "fit"
+    ours = Triangles(posed, job.template.require_mesh().triangles, job.settings.samples)
     alignment = Alignment.of(ours, job.exact, found.similarity, how)
     return PosedAlignment(
         alignment, found.figure, found.pose, posed, _lines(found), _most_rotated(found)
@@ -210,89 +298,6 @@ def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: Up) -> Alignment:
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
-
-
-def _stretched(
-    ours: Posed, exact: Triangles, kept: PosedAlignment, samples: int
-) -> PosedAlignment | None:
-    """Return the template with separate scales per axis, if that removes most of the error."""
-    rigid = kept.alignment
-    template = Triangles(ours.positions, ours.triangles, samples)
-    trials = [
-        fit_axes(template, exact, rigid.similarity, _AXES_ROUNDS, rotations=True, own=own)
-        for own in (False, True)
-    ]
-    alignments = [
-        Alignment.of(template, exact, similarity, "fit")
-        for similarity in trials
-        if _stretch(similarity) >= _STRETCH
-    ]
-    if not alignments:
-        return None
-    # If both have the same axes, use the target's, to which --scale axes refers.
-    alignment, *other = alignments
-    if other and misfit(other[0], False) < _CLEARLY * misfit(alignment, False):
-        alignment = other[0]
-    after, before = misfit(alignment, False), misfit(rigid, False)
-    found = replace(
-        kept,
-        alignment=alignment,
-        lines=(
-            note(
-                "R003.proportions: proportions: template stretched by {scales}, pose kept",
-                scales=_scales(alignment.similarity),
-            ),
-            note(wording.GAP, gap=_gap(after, before)),
-        ),
-    )
-    return found if _is_closer(found, kept) else None
-
-
-def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
-    """Return whether a stretched template leaves a much smaller error than the other alignment."""
-    gap = misfit(stretched.alignment, False)
-    return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
-
-
-def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
-    """Return a message saying that a stretched template would fit better."""
-    gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
-    similarity = stretched.alignment.similarity
-    is_own = (similarity.factors == 1.0).all()
-    key = (
-        "R004.stretched-along-its-axes: the template fits much better if stretched by "
-        "{scales} ({gap:.2f} % of the size apart instead of {kept:.2f} %): fit proportions "
-        "if the target was stretched"
-        if is_own
-        else "R004.stretched-along-the-target: the template fits much better if stretched by "
-        "{scales} ({gap:.2f} % of the size apart instead of {kept:.2f} %): use {remedy} if "
-        "the target was stretched"
-    )
-    return note(
-        key,
-        scales=_scales(similarity),
-        gap=gap,
-        kept=other,
-        remedy=Remedy("another Scale", "--scale axes"),
-    )
-
-
-def _stretch(similarity: Similarity) -> float:
-    factors = similarity.factors * similarity.own_factors
-    return float(factors.max() / factors.min())
-
-
-def _scales(similarity: Similarity) -> Phrase:
-    """Return the scales along the axes of the template or the target."""
-    is_own = bool((similarity.factors == 1.0).all())
-    scales = similarity.scale * (similarity.own_factors if is_own else similarity.factors)
-    x, y, z = scales.tolist()
-    key = (
-        "{x}, {y}, {z} along its own x, y and z"
-        if is_own
-        else "{x}, {y}, {z} along the target's x, y and z"
-    )
-    return Phrase(key, x=rounded(x, 4), y=rounded(y, 4), z=rounded(z, 4))
 
 
 def _gap(after: float, before: float) -> Phrase:

@@ -33,6 +33,9 @@ TemplateScale: TypeAlias = Literal["uniform", "axes", "none"]
 SCALES: tuple[TemplateScale, ...] = ("uniform", "axes", "none")
 """One common scale, one scale along each axis of the target, or the template's size unchanged."""
 
+DEFAULT_UP = "y"
+"""Up axis of a target for which none is known."""
+
 SAMPLES = 2_000
 """Default number of points of each surface that an alignment uses."""
 
@@ -66,8 +69,12 @@ class Posed:
 class AlignmentSettings:
     """Known facts about an alignment, and options."""
 
-    up: str | None = setting(None, "up axis of the target (default: estimated)")
-    facing: str | None = setting(None, "front of the target (default: estimated)")
+    up: str | None = setting(
+        None, "up axis of the target (default: that of its file format, y for .obj and .ply)"
+    )
+    facing: str | None = setting(
+        None, "front of the target (default: estimated from its feet and shape)"
+    )
     scale: TemplateScale = setting(
         "uniform",
         "scale of the template: one factor, one factor per axis, or none (default: {default})",
@@ -173,6 +180,10 @@ def align(
     report_fraction(0.1, "aligning the template")
     if stays.error <= _SURELY:
         return Alignment.of(ours, theirs, stays.similarity, "in place")
+    # A figure with other proportions may fit best upside down: only a mesh that coincides with the
+    # template may be rotated.
+    rotations = axis_rotations(template_up, settings.up or DEFAULT_UP, settings.facing)
+    stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
     with part_of_work(span=(0.1, 0.8)):
         best = search(coarse[0], coarse[1], rotations, scale)
     left = Alignment.of(ours, theirs, stays.similarity, "in place")

@@ -1,0 +1,139 @@
+"""Anatomy of figures made of capsules, whose joints are known by construction."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from viewer.autorig.anatomy import anatomy_of, body_points, feet_ahead, plans_of
+from viewer.errors import RigError
+
+UP = np.array([0.0, 1.0, 0.0])
+AHEAD = np.array([0.0, 0.0, 1.0])
+
+
+def ball_chain(*balls):
+    """Return overlapping closed spheres (N, 4) along the lines between given ones."""
+    parts = []
+    for start, end in pairwise(balls):
+        a, b = np.array(start, dtype=float), np.array(end, dtype=float)
+        count = int(np.linalg.norm(b[:3] - a[:3]) / (0.4 * min(a[3], b[3]))) + 2
+        parts.append(np.linspace(a, b, count))
+    return np.concatenate(parts)
+
+
+def sphere(ball):
+    """Return a closed sphere of 10 rings."""
+    x, y, z, radius = ball
+    polar, around = np.linspace(0, np.pi, 9), np.arange(10) * np.pi / 5
+    rings = np.array([[np.sin(p) * np.cos(q), np.cos(p), np.sin(p) * np.sin(q)]
+                      for p in polar for q in around])  # fmt: skip
+    index = np.arange(90).reshape(9, 10)
+    a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
+    c, d = np.roll(index, -1, axis=1)[1:], index[1:]
+    triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return rings * radius + [x, y, z], triangles
+
+
+def mesh(*chains):
+    parts = [sphere(ball) for chain in chains for ball in chain]
+    starts = 90 * np.arange(len(parts))
+    return (
+        np.concatenate([positions for positions, _ in parts]),
+        np.concatenate([start + each for start, (_, each) in zip(starts, parts, strict=True)]),
+    )
+
+
+def both(*balls):
+    """Return a limb on the left, +x, and its mirror image."""
+    return [ball_chain(*((sign * x, y, z, r) for x, y, z, r in balls)) for sign in (1.0, -1.0)]
+
+
+def person(head=0.12, ears=False):
+    """Return a person 1.4 high with feet towards +z: hips at 0.6, shoulders at 1.0 and x = 0.2."""
+    parts = [
+        ball_chain((0, 0.65, 0, 0.12), (0, 1.0, 0, 0.12)),
+        ball_chain((0, 1.05, 0, 0.05), (0, 1.12 + head, 0, 0.05)),
+        [(0, 1.12 + head, 0, head)],
+        *both((0.1, 0.6, 0, 0.06), (0.1, 0.04, 0, 0.05), (0.1, 0.04, 0.14, 0.04)),
+        *both((0.1, 1.0, 0, 0.05), (0.7, 1.0, 0, 0.05)),
+    ]
+    if ears:
+        parts += both((0.5 * head, 1.12 + 1.7 * head, 0, 0.04), (0.3, 1.9 + head, 0, 0.04))
+    return mesh(*parts)
+
+
+@pytest.mark.parametrize("head", [0.12, 0.35])
+def test_limbs_and_head_of_a_person_are_found_whatever_the_size_of_the_head(head):
+    anatomy = anatomy_of(*person(head), UP)
+    assert abs(anatomy.lateral[0]) == pytest.approx(1.0)  # not a diagonal
+    plans = plans_of(anatomy, is_quadruped=False)
+    assert len(plans) == 2  # both facings of one pair of arms
+    plan = next(plan for plan in plans if plan.left[0] > 0.0)
+    size = 1.4
+    left_hand, right_hand = (limb.points[0] for limb in plan.upper.limbs)
+    assert abs(abs(left_hand[0]) - 0.75) < 0.02 * size and left_hand[0] * right_hand[0] < 0.0
+    assert max(limb.points[0][1] for limb in plan.lower.limbs) < 0.1
+    points = body_points(anatomy, plan, is_quadruped=False)
+    # The head is the widest place above the chest: its centre and its radius.
+    row = int(np.nanargmax(np.where(points.positions[:, 1] > 1.05, points.radii, np.nan)))
+    np.testing.assert_allclose(points.positions[row], [0, 1.12 + head, 0], atol=0.03 * size)
+    # A voxel is 0.016 to 0.02 wide, and the sphere's inscribed polyhedron 5 % smaller.
+    assert 0.95 * head - 0.04 < points.radii[row] < head
+
+
+def test_ears_as_long_as_arms_are_another_pair():
+    anatomy = anatomy_of(*person(0.3, ears=True), UP)
+    plans = plans_of(anatomy, is_quadruped=False)
+    arms = [plan for plan in plans if abs(plan.upper.attachment[1] - 1.0) < 0.1]
+    # The lowest pair above the legs comes first.
+    assert len(arms) == 2 and plans[0] in arms
+
+
+def test_feet_point_to_the_front():
+    anatomy = anatomy_of(*person(), UP)
+    for plan in plans_of(anatomy, is_quadruped=False):
+        ahead = float(np.cross(plan.left, UP) @ AHEAD)
+        # Soles reach from z = -0.05 to 0.18, shins are at 0: 0.13 of a height of 1.36.
+        assert feet_ahead(anatomy, plan, False) == pytest.approx(ahead * 0.13 / 1.36, abs=0.03)
+
+
+def test_known_front_leaves_one_facing():
+    anatomy = anatomy_of(*person(), UP, np.array([1.0, 0, 0]))
+    (plan,) = plans_of(anatomy, False, AHEAD)
+    np.testing.assert_allclose(plan.left, [1.0, 0, 0])
+
+
+def test_oblique_figure_has_an_oblique_plane():
+    positions, triangles = person()
+    angle = np.radians(35.0)
+    turned = positions @ np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0],
+                                   [np.sin(angle), 0, np.cos(angle)]])  # fmt: skip
+    anatomy = anatomy_of(turned, triangles, UP)
+    left = np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    assert abs(float(anatomy.lateral @ left)) > np.cos(np.radians(3.0))
+    assert len(plans_of(anatomy, False)) == 2
+
+
+def test_quadruped_has_two_standing_pairs_in_both_orders():
+    animal = mesh(
+        ball_chain((0, 0.6, -0.6, 0.13), (0, 0.6, 0.6, 0.13)),
+        ball_chain((0, 0.65, 0.6, 0.08), (0, 1.0, 0.9, 0.1)),
+        *both((0.1, 0.55, -0.55, 0.06), (0.1, 0.04, -0.55, 0.04)),
+        *both((0.1, 0.55, 0.55, 0.06), (0.1, 0.04, 0.55, 0.04)),
+    )
+    anatomy = anatomy_of(*animal, UP)
+    front, back = sorted(plans_of(anatomy, is_quadruped=True), key=lambda plan: -plan.left[0])
+    for plan, z in ((front, 0.55), (back, -0.55)):
+        assert plan.upper.attachment[2] == pytest.approx(z, abs=0.06)
+        assert plan.lower.attachment[2] == pytest.approx(-z, abs=0.06)
+
+
+def test_ball_has_no_plan():
+    anatomy = anatomy_of(*mesh([(0, 0, 0, 1.0)]), UP)
+    assert plans_of(anatomy, False) == [] and plans_of(anatomy, True) == []
+
+
+def test_mesh_without_area_is_refused():
+    with pytest.raises(RigError, match="expected a mesh with an area, found none"):
+        anatomy_of(np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0]]), np.array([[0, 1, 2]]), UP)

@@ -1,0 +1,256 @@
+"""Starts of a fit from anatomy: the template's limbs are put where the target's limbs are.
+
+A search for the similarity that aligns two surfaces fails if the proportions differ: a figure with
+a large head fits another one best upside down. The points of the anatomy (``body_points``) of
+template and target correspond to each other, whatever the proportions. They become vertices of the
+template, with the weights of the surface around them, and the fit of pose and proportions starts by
+moving them to their counterparts. The radii there give the girths of the limbs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.autorig.alignment.orientation_search import axis_direction
+from viewer.autorig.alignment.pose_fit import (
+    Fitted,
+    Marks,
+    aligned_positions,
+    fit_marks,
+    start_of,
+)
+from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.anatomy import (
+    Anatomy,
+    BodyPoints,
+    Plan,
+    anatomy_of,
+    body_points,
+    feet_ahead,
+    plans_of,
+)
+from viewer.data_classes import dataclass
+from viewer.progress import report_fraction
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import Pose, placement_matrix
+from viewer.rig.skin import owners, skin_from_entries, weight_sums
+from viewer.rig.skinning.lbs import blended_matrices
+
+_AROUND = 1.3  # vertices around a point, up to this multiple of the distance from the surface
+_FEWEST = 8  # minimum number of vertices whose weights a point gets
+_STRENGTH = 1.0  # of marks when nothing else is fitted
+_USUAL_FRONT = np.array([0.0, 0.0, 1.0])
+_SURE_FEET = 0.03  # reach of feet over the height, above which it decides the facing
+_THINNEST = 0.5  # radius in voxels below which girths are not estimated from it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TemplateBody:
+    """A template with its anatomy."""
+
+    figure: Figure
+    pose: Pose
+    anatomy: Anatomy
+    points: BodyPoints
+    is_quadruped: bool
+    left: Floats
+    """(3,). Unit vector to its left."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """A template whose limbs are at those of a target."""
+
+    marked: Figure
+    """The template, with marks as additional vertices."""
+    fitted: Fitted
+    marks: Marks
+    plan: Plan
+    is_sure: bool
+    """Whether the facing is known: given, or shown by the feet."""
+    is_usual: bool
+    """Whether it faces as glTF prescribes: +z, if y is up."""
+    error: float
+    """Root mean square distance of the marks from their positions, over the target's size."""
+
+
+def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody | None:
+    """Return the anatomy of a posed template; None if it lacks two pairs of limbs."""
+    mesh = figure.require_mesh()
+    up = axis_direction(figure.up)
+    # A figure faces +z if y is up, and +x if z is up.
+    front = axis_direction("z" if figure.up == "y" else "x")
+    left = np.cross(up, front)
+    anatomy = anatomy_of(positions, mesh.triangles, up, left)
+    standing = [pair for pair in anatomy.pairs[:2] if anatomy.stands(pair)]
+    is_quadruped = len(standing) == 2
+    plans = plans_of(anatomy, is_quadruped, front)
+    if not plans:
+        return None
+    points = body_points(anatomy, plans[0], is_quadruped)
+    return TemplateBody(figure, pose, anatomy, points, is_quadruped, left)
+
+
+def starts_of(body: TemplateBody, target: Anatomy, front: Floats | None) -> list[Start]:
+    """Return a start for each likely plan of the target, the one with the least error first."""
+    plans = plans_of(target, body.is_quadruped, front)
+    found = []
+    for number, plan in enumerate(plans):
+        report_fraction(number / len(plans), "fitting limbs")
+        # Feet point to the front; stumps and hooves say little.
+        feet = feet_ahead(target, plan, body.is_quadruped)
+        if front is not None or feet >= -_SURE_FEET:
+            found.append(_start(body, target, plan, front is not None or feet > _SURE_FEET))
+    return sorted(found, key=lambda start: start.error)
+
+
+def _start(body: TemplateBody, target: Anatomy, plan: Plan, is_sure: bool) -> Start:
+    points = body_points(target, plan, body.is_quadruped)
+    own = body.points
+    common = np.isfinite(own.positions).all(axis=1) & np.isfinite(points.positions).all(axis=1)
+    ours, theirs = own.positions[common], points.positions[common]
+    weights = np.minimum(own.weights, points.weights)[common]
+    similarity = _similarity(body, target, plan, ours, theirs, weights)
+    size = target.size
+    marked, vertices = with_marks(
+        body.figure, body.pose, ours, _AROUND * own.radii[common] + body.anatomy.solid.spacing
+    )
+    marks = Marks(vertices, theirs, weights, _STRENGTH)
+    few, limbs = _only(marked, limbs_of(marked), vertices)
+    alone = replace(marks, vertices=np.arange(len(vertices), dtype=np.int32))
+    fitted = fit_marks(few, start_of(few, body.pose, similarity), limbs, alone, size)
+    thin = _THINNEST * np.array([body.anatomy.solid.spacing, target.solid.spacing])
+    ratios = np.log(
+        np.maximum(points.radii[common], thin[1]) / np.maximum(own.radii[common], thin[0])
+    ) - np.log(fitted.similarity.scale)
+    grown = np.stack([fitted.grown[0], _girths(marked, limbs, ratios)])
+    fitted = replace(fitted, grown=grown, figure=resized(few, limbs, *np.exp(grown)))
+    # Thicker limbs move the points near their ends a little.
+    fitted = fit_marks(few, fitted, limbs, alone, size)
+    error = _error(fitted, alone, size)
+    whole = resized(marked, limbs_of(marked), *np.exp(fitted.grown))
+    ahead = np.cross(plan.left, target.up)
+    is_usual = bool(ahead @ _USUAL_FRONT > 0.5)
+    return Start(marked, replace(fitted, figure=whole), marks, plan, is_sure, is_usual, error)
+
+
+def _only(figure: Figure, limbs: Limbs, vertices: Ints) -> tuple[Figure, Limbs]:
+    """Return a figure with some of its vertices and no triangles, and the limbs of these."""
+    mesh, _, skin = figure.attached()
+    rows, columns = np.nonzero(limbs.weights[vertices])
+    few = skin_from_entries(
+        len(vertices),
+        rows.astype(np.int32),
+        columns.astype(np.int32),
+        limbs.weights[vertices][rows, columns],
+        skin.inverse_bind,
+    )
+    none = np.zeros((0, 3), dtype=np.int32)
+    points = Mesh(mesh.positions[vertices], mesh.normals[vertices], none)
+    kept = replace(limbs, weights=limbs.weights[vertices], fractions=limbs.fractions[vertices])
+    return replace(figure, mesh=points, skin=few), kept
+
+
+def _similarity(
+    body: TemplateBody,
+    target: Anatomy,
+    plan: Plan,
+    ours: Floats,
+    theirs: Floats,
+    weights: Floats,
+) -> Similarity:
+    """Return the map of the template's axes to the target's, with mean position and scale."""
+    own_up = axis_direction(body.figure.up)
+    own = np.stack([body.left, own_up, np.cross(body.left, own_up)], axis=1)
+    other = np.stack([plan.left, target.up, np.cross(plan.left, target.up)], axis=1)
+    rotation = other @ own.T
+    share = weights / weights.sum()
+    from_mean, to_mean = share @ ours, share @ theirs
+    spreads = [
+        float(np.sqrt(share @ ((points - mean) ** 2).sum(axis=1)))
+        for points, mean in ((ours, from_mean), (theirs, to_mean))
+    ]
+    scale = spreads[1] / spreads[0]
+    return Similarity(scale, rotation, to_mean - scale * rotation @ from_mean, np.ones(3))
+
+
+def with_marks(figure: Figure, pose: Pose, points: Floats, reach: Floats) -> tuple[Figure, Ints]:
+    """Return a figure with points (P, 3) of its posed body as vertices, and their numbers.
+
+    Each gets the mean weights of the vertices within its ``reach`` (P,), in the figure's unit; a
+    point at a joint is attached to that joint.
+    """
+    from scipy import spatial
+
+    mesh, skeleton, skin = figure.attached()
+    world = world_matrices(skeleton, pose)
+    palette = skinning_matrices(world, skin.inverse_bind)
+    place = placement_matrix(pose)
+    matrices = blended_matrices(skin, palette)
+    bound = np.einsum("vab,vb->va", matrices[:, :, :3], mesh.positions) + matrices[:, :, 3]
+    posed = bound @ place[:3, :3].T + place[:3, 3]
+    used = np.unique(mesh.triangles)
+    tree = spatial.cKDTree(posed[used])
+    joints = world[:, :3, 3] @ place[:3, :3].T + place[:3, 3]
+    size = float(np.ptp(posed[used], axis=0).max())
+    sums = weight_sums(skin)
+    of, shares = owners(skin), skin.weights / np.where(sums > 0.0, sums, 1.0)[owners(skin)]
+    table = np.zeros((len(points), skin.n_joints))
+    for row, (point, radius) in enumerate(zip(points, reach.tolist(), strict=True)):
+        at = np.linalg.norm(joints - point, axis=1)
+        if at.min() <= 1e-6 * size:
+            table[row, int(at.argmin())] = 1.0
+            continue
+        near = tree.query_ball_point(point, radius)
+        if len(near) < _FEWEST:
+            near = tree.query(point, k=min(_FEWEST, len(used)))[1]
+        chosen = np.isin(of, used[np.atleast_1d(near)])
+        table[row] = np.bincount(skin.joints[chosen], shares[chosen], minlength=skin.n_joints)
+        table[row] /= max(float(table[row].sum()), 1e-12)
+    # In the bind pose, the point is where its blended matrix poses it to the given position.
+    blended = np.einsum("pj,jab->pab", table, place @ palette)
+    rest = np.linalg.solve(blended[:, :3, :3], (points - blended[:, :3, 3])[..., None])[..., 0]
+    count = len(mesh.positions)
+    rows, columns = np.nonzero(table)
+    grown = skin_from_entries(
+        count + len(points),
+        np.concatenate([of, rows + count]),
+        np.concatenate([skin.joints, columns]),
+        np.concatenate([skin.weights, table[rows, columns]]),
+        skin.inverse_bind,
+    )
+    positions = np.concatenate([mesh.positions, rest])
+    normals = np.concatenate([mesh.normals, np.zeros_like(rest)])
+    plain = Figure(
+        figure.name, Mesh(positions, normals, mesh.triangles), skeleton, grown, up=figure.up
+    )
+    return plain, np.arange(count, count + len(points), dtype=np.int32)
+
+
+def _girths(figure: Figure, limbs: Limbs, ratios: Floats) -> Floats:
+    """Return each joint's girth (J,): the mean over its marks, or that of its parent."""
+    parents = figure.require_skeleton().parents
+    weights = limbs.weights
+    total = weights.sum(axis=0)
+    means = weights.T @ ratios / np.maximum(total, 1e-12)
+    overall = float(np.median(ratios))
+    girths = np.where(total > 0.2, means, np.nan)
+    for joint in range(len(parents)):
+        if np.isnan(girths[joint]):
+            girths[joint] = girths[parents[joint]] if parents[joint] >= 0 else overall
+    return np.clip(0.5 * (girths + girths[limbs.partners]), *_GIRTHS)
+
+
+_GIRTHS = (np.log(0.25), np.log(4.0))  # limits of the logarithms of girths
+
+
+def _error(fitted: Fitted, marks: Marks, size: float) -> float:
+    gaps = aligned_positions(fitted)[marks.vertices] - marks.targets
+    squares = np.einsum("na,na->n", gaps, gaps)
+    return float(np.sqrt(marks.weights @ squares / marks.weights.sum())) / size

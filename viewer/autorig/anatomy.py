@@ -1,0 +1,548 @@
+"""Anatomy of a standing figure: the plane of symmetry, pairs of limbs, trunk, neck and head.
+
+Found in the voxels of its solid, given only the up axis:
+
+- The sagittal plane is the vertical plane in which the solid mirrors itself best.
+- Limbs are protrusions from that plane: tips are maxima of the geodesic distance from it, as long
+  as the protrusion is longer than others that it merges with (persistence; Edelsbrunner et al.
+  2002). Hands and feet are found so in any pose in which they do not touch other parts, whatever
+  the proportions; fingers and toes merge into one tip.
+- The tips of both sides are paired by length, place of attachment and mirrored position.
+- A limb's axis is the path from its tip to the plane that prefers voxels far from the surface. Its
+  junction with the trunk is where the radius exceeds the smallest one of the upper limb by half.
+- The neck is where the radius along the path to the top of the head is smallest between two wider
+  parts; the head is the widest place beyond it.
+
+The points of the same anatomy in a template and in a target correspond to each other; see
+``body_points``. Errors common to both, such as a junction a little too far inside, cancel out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.autorig.solid import RESOLUTION, Solid, solid_of
+from viewer.data_classes import dataclass
+from viewer.progress import part_of_work, report_fraction
+from viewer.rig.arrays import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+_MOST_VOXELS = 80_000  # above which a coarser grid is used: a ball fills half of its box
+_ANGLES = 36  # directions of the sagittal plane that are tried, every 5 degrees
+_FINE = np.radians([-2.5, -1.25, 1.25, 2.5])  # around the best of them
+_TILTED = 0.02  # gain of symmetry for which an oblique plane is preferred to a coordinate plane
+_BOTH_WAYS = 0.01  # difference of symmetries that is within the accuracy of voxels
+_MIRRORED = 4000  # voxels that are mirrored
+_TRUNK_PART = 0.1  # smallest part of trunk or head in the plane, as a fraction of the largest
+
+_BAND = 1.5  # thickness of a level set of the geodesic distance, in voxels
+_PROMINENT = 0.06  # shortest persistence of a limb, as a fraction of the size
+_OWN = 0.4  # shortest persistence of a limb, as a fraction of its length: fingers have less
+_PAIRED = 0.3  # largest difference of two limbs of a pair, as a fraction of the size
+_MOST_PAIRS = 4  # longest pairs that are considered
+
+# Exponent of the radius in the cost of a path. Above 1, a detour through the middle of a wide part
+# is worth its length.
+_MEDIAL = 1.5
+_UPPER = (0.45, 0.95)  # part of a limb's path with the smallest radius of the upper limb
+_WIDER = 1.5  # ratio of radii at the junction with the trunk
+_ON_GROUND = 0.12  # height of the tip of a leg, as a fraction of the figure's height
+
+_ARM = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)  # fractions of the path from tip to junction
+_LEG = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # fractions of the height of the attachment
+_AS_LONG = 0.5  # length of arms relative to the longest limbs above the legs
+_MOST_ARMS = 2  # pairs that may be arms: ears of a rabbit are as long
+_TAIL = 0.12  # shortest tail, as a fraction of the size
+_HEAD = (0.3, 0.95)  # part of the path from chest to top that contains the widest place of a head
+# Part of a leg's height to which a sole reaches, at which the shin is, and longest foot.
+_SOLE, _SHIN, _FOOT = 0.12, 0.3, 0.6
+_TRUNK = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limb:
+    """One limb: its path from the tip to the sagittal plane."""
+
+    points: Floats
+    """(K, 3). Voxel centres along the path."""
+    radii: Floats
+    """(K,). Distances from the surface there."""
+    attachment: Floats
+    """(3,). The point of the plane that is closest to the tip along the inside."""
+    length: float
+    """Geodesic distance of the tip from the plane."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LimbPair:
+    """Limbs on both sides of the sagittal plane."""
+
+    limbs: tuple[Limb, Limb]
+    """On the positive and on the negative side of ``Anatomy.lateral``."""
+
+    @property
+    def length(self) -> float:
+        """Mean length of both."""
+        return 0.5 * (self.limbs[0].length + self.limbs[1].length)
+
+    @property
+    def attachment(self) -> Floats:
+        """Mean place of attachment: (3,)."""
+        return 0.5 * (self.limbs[0].attachment + self.limbs[1].attachment)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Anatomy:
+    """What was found in a solid."""
+
+    solid: Solid
+    up: Floats
+    lateral: Floats
+    """(3,), (3,). Unit vectors; the lateral one is normal to the sagittal plane."""
+    offset: float
+    """The plane: points with ``lateral . p = offset``."""
+    symmetry: float
+    """Fraction of the voxels whose mirror images are inside, 0 to 1."""
+    pairs: tuple[LimbPair, ...]
+    """The longest first."""
+    paths: Paths
+    """Medial paths in the solid."""
+
+    @property
+    def size(self) -> float:
+        """Longest side of the solid's box."""
+        extents = np.ptp(self.solid.voxels, axis=0)
+        return float(self.solid.spacing * extents.max())
+
+    @property
+    def ground(self) -> float:
+        """Height of the lowest voxel."""
+        return float((self.solid.centers(self.solid.voxels) @ self.up).min())
+
+    @property
+    def height(self) -> float:
+        """Height of the highest voxel above the lowest."""
+        return float(np.ptp(self.solid.centers(self.solid.voxels) @ self.up))
+
+    def stands(self, pair: LimbPair) -> bool:
+        """Return whether both tips of a pair are on the ground."""
+        tips = np.array([limb.points[0] for limb in pair.limbs]) @ self.up
+        return bool((tips - self.ground <= _ON_GROUND * self.height).all())
+
+
+class Paths:
+    """Shortest paths through the middle of a solid."""
+
+    def __init__(self, solid: Solid) -> None:
+        self.solid = solid
+        self.radii = solid.radii()
+        # Close to the surface, the radius is known to half a voxel only.
+        wide = np.maximum(self.radii / solid.spacing, 0.5)
+        self._graph: csr_array = solid.graph(wide**-_MEDIAL)
+
+    def to(self, ends: Ints, starts: Ints) -> list[Ints]:
+        """Return the path from each start to the nearest of the ends, as rows of the solid."""
+        from scipy.sparse import csgraph
+
+        _, before, _ = csgraph.dijkstra(
+            self._graph, indices=ends, min_only=True, return_predecessors=True
+        )
+        found = []
+        for start in starts.tolist():
+            rows = [start]
+            while before[rows[-1]] >= 0:
+                rows.append(int(before[rows[-1]]))
+            found.append(np.array(rows, dtype=np.int32))
+        return found
+
+
+def anatomy_of(
+    positions: Floats, triangles: Ints, up: Floats, lateral: Floats | None = None
+) -> Anatomy:
+    """Find the anatomy of a mesh with a known up axis; ``lateral`` if it is known, too."""
+    from scipy.sparse import csgraph
+
+    with part_of_work(span=(0.0, 0.3)):
+        solid = solid_of(positions, triangles)
+        if len(solid.voxels) > _MOST_VOXELS:
+            coarser = (_MOST_VOXELS / len(solid.voxels)) ** (1.0 / 3.0)
+            solid = solid_of(positions, triangles, max(16, int(RESOLUTION * coarser)))
+    report_fraction(0.3, "anatomy")
+    lateral, offset, symmetry = _sagittal_plane(solid, up, lateral)
+    centers = solid.centers(solid.voxels)
+    sides = centers @ lateral - offset
+    steps = solid.graph()
+    middle = _middle(steps, np.abs(sides) <= 1.01 * solid.spacing)
+    distances, _, sources = csgraph.dijkstra(
+        steps, indices=middle, min_only=True, return_predecessors=True
+    )
+    report_fraction(0.5, "anatomy")
+    size = float(solid.spacing * np.ptp(solid.voxels, axis=0).max())
+    tips = _tips(steps, np.where(np.isfinite(distances), distances, 0.0), solid.spacing)
+    tips = tips[distances[tips] >= _PROMINENT * size]
+    report_fraction(0.8, "anatomy")
+    paths = Paths(solid)
+    limbs = [
+        Limb(
+            centers[path],
+            paths.radii[path],
+            centers[sources[tip]],
+            float(distances[tip]),
+        )
+        for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
+    ]
+    pairs = _paired(limbs, sides[tips] > 0.0, lateral, offset, size)
+    report_fraction(1.0, "anatomy")
+    return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
+
+
+def _sagittal_plane(
+    solid: Solid, up: Floats, lateral: Floats | None
+) -> tuple[Floats, float, float]:
+    """Return normal and offset of the vertical plane of best mirror symmetry, and the symmetry."""
+    centers = solid.centers(solid.voxels)
+    some = centers[:: max(1, len(centers) // _MIRRORED)]
+    if lateral is not None:
+        return lateral, *_symmetry(solid, some, lateral)
+    # Two horizontal vectors, along coordinate axes if up is one.
+    first = np.cross(up, np.eye(3)[int(np.abs(up).argmin())])
+    first = first / np.linalg.norm(first)
+    second = np.cross(up, first)
+
+    def tried(angle: float) -> tuple[float, float, Floats, float]:
+        normal = np.cos(angle) * first + np.sin(angle) * second
+        offset, symmetry = _symmetry(solid, some, normal)
+        return symmetry, float(np.ptp(some @ normal)), normal, offset
+
+    angles = np.arange(_ANGLES) * np.pi / _ANGLES
+    found = [tried(angle) for angle in angles.tolist()]
+    best = int(np.argmax([each[0] for each in found]))
+    plain, other = sorted((found[0], found[_ANGLES // 2]), key=lambda each: -each[0])
+    # A figure that is symmetric both ways, as without feet, is wider from side to side.
+    if other[0] >= plain[0] - _BOTH_WAYS and other[1] > plain[1]:
+        plain = other
+    if found[best][0] < plain[0] + _TILTED:
+        return plain[2], plain[3], plain[0]
+    near = [found[best], *(tried(float(angles[best] + step)) for step in _FINE)]
+    symmetry, _, normal, offset = max(near, key=lambda each: each[0])
+    return normal, offset, symmetry
+
+
+def _symmetry(solid: Solid, points: Floats, normal: Floats) -> tuple[float, float]:
+    """Return the offset of the best plane with this normal, and the fraction mirrored inside."""
+    from scipy import ndimage
+
+    along = points @ normal
+    # Within one voxel, the mirror image of the boundary is inside or outside by chance.
+    around = ndimage.binary_dilation(solid.inside, np.ones((3, 3, 3)))
+    # The plane halves a symmetric solid; props on one side move the halving plane a little.
+    offsets = float(np.median(along)) + solid.spacing * np.linspace(-2.0, 2.0, 9)
+    fractions = []
+    for offset in offsets.tolist():
+        arms = along - offset
+        mirrored = points - 2.0 * arms[:, None] * normal
+        # Every section near the middle is symmetric: what is far from the plane counts more.
+        weights = np.abs(arms)
+        found = around[tuple(solid.voxel_of(mirrored).T)]
+        fractions.append(float(weights @ found) / max(float(weights.sum()), 1e-12))
+    # The middle one of equally good planes.
+    best = np.flatnonzero(np.array(fractions) >= max(fractions) - 1e-3)
+    chosen = int(best[len(best) // 2])
+    return float(offsets[chosen]), fractions[chosen]
+
+
+def _middle(steps: csr_array, is_near: Bools) -> Ints:
+    """Return the voxels of trunk and head in the sagittal plane, as rows of the solid."""
+    from scipy.sparse import csgraph
+
+    rows = np.flatnonzero(is_near)
+    labels = csgraph.connected_components(steps[rows][:, rows], directed=False)[1]
+    # Feet and thighs that touch each other in the plane are limbs nevertheless.
+    sizes = np.bincount(labels)
+    found: Ints = rows[sizes[labels] >= _TRUNK_PART * sizes.max()].astype(np.int32)
+    return found
+
+
+def _tips(steps: csr_array, distances: Floats, spacing: float) -> Ints:
+    """Return the prominent maxima of the distance: rows of the solid.
+
+    Two protrusions that merge are one, with the longer tip, unless the part of the shorter one
+    beyond their junction is at least ``_OWN`` of its length.
+    """
+    from scipy.sparse import coo_array, csgraph
+
+    # Level sets, not voxels: a surface of voxels has many small maxima.
+    bands = (distances / (_BAND * spacing)).astype(np.int64)
+    links = steps.tocoo()
+    same = bands[links.row] == bands[links.col]
+    level = coo_array((np.ones(int(same.sum())), (links.row[same], links.col[same])), steps.shape)
+    count, labels = csgraph.connected_components(level, directed=False)
+    farthest = np.zeros(count)
+    np.maximum.at(farthest, labels, distances)
+    band = np.zeros(count, dtype=np.int64)
+    band[labels] = bands
+    below = bands[links.row] > bands[links.col]
+    edges = np.unique(np.stack([labels[links.row[below]], labels[links.col[below]]], 1), axis=0)
+    above: list[list[int]] = [[] for _ in range(count)]
+    for high, low in edges.tolist():
+        above[low].append(high)
+    # From the farthest level sets towards the plane, each keeps the tips of those above it.
+    group = list(range(count))
+    kept = [[node] for node in range(count)]
+
+    def root(node: int) -> int:
+        while group[node] != node:
+            group[node] = group[group[node]]
+            node = group[node]
+        return node
+
+    for node in np.argsort(-band, kind="stable").tolist():
+        joined = {root(high) for high in above[node]}
+        tips = sorted({tip for one in joined for tip in kept[one]}, key=lambda tip: farthest[tip])
+        if tips:
+            junction = _BAND * spacing * float(band[node])
+            # The farthest tip stays; others if most of their length is their own.
+            kept[node] = [
+                tip for tip in tips[:-1] if farthest[tip] - junction >= _OWN * farthest[tip]
+            ] + tips[-1:]
+        for one in joined:
+            group[one] = node
+    found = sorted({tip for node in range(count) if root(node) == node for tip in kept[node]})
+    is_tip = np.isin(labels, found)
+    rows = np.flatnonzero(is_tip)
+    # The farthest voxel of each of these level sets.
+    order = rows[np.lexsort((-distances[rows], labels[rows]))]
+    first = np.unique(labels[order], return_index=True)[1]
+    return order[first].astype(np.int32)
+
+
+def _paired(
+    limbs: list[Limb], positive: Bools, lateral: Floats, offset: float, size: float
+) -> tuple[LimbPair, ...]:
+    """Pair the limbs of both sides, the most similar ones first."""
+    ours = [limb for limb, side in zip(limbs, positive.tolist(), strict=True) if side]
+    others = [limb for limb, side in zip(limbs, positive.tolist(), strict=True) if not side]
+    costs = []
+    for i, one in enumerate(ours):
+        for j, other in enumerate(others):
+            tip = other.points[0]
+            mirrored = tip - 2.0 * (float(tip @ lateral) - offset) * lateral
+            # A limb in another pose has the same length and root, but another tip.
+            cost = abs(one.length - other.length)
+            cost += float(np.linalg.norm(one.attachment - other.attachment))
+            cost += 0.25 * float(np.linalg.norm(one.points[0] - mirrored))
+            costs.append((cost, i, j))
+    pairs: list[LimbPair] = []
+    left, right = set(range(len(ours))), set(range(len(others)))
+    for cost, i, j in sorted(costs):
+        if cost <= _PAIRED * size and i in left and j in right:
+            left.remove(i)
+            right.remove(j)
+            pairs.append(LimbPair((ours[i], others[j])))
+    return tuple(sorted(pairs, key=lambda pair: -pair.length))[:_MOST_PAIRS]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Which pairs are legs and which are arms or forelegs, and where the front is."""
+
+    lower: LimbPair
+    upper: LimbPair
+    left: Floats
+    """(3,). Unit vector to the figure's left."""
+
+    def ground(self, up: Floats) -> float:
+        """Return the height of the lower tip of the legs: props may reach deeper."""
+        return min(float(limb.points[0] @ up) for limb in self.lower.limbs)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPoints:
+    """Points along limbs, trunk, neck and head, in an order that depends on no figure."""
+
+    positions: Floats
+    """(P, 3). NaN for those that the figure lacks."""
+    radii: Floats
+    """(P,). Distances from the surface there."""
+    weights: Floats
+    """(P,). How well each is determined, 0 to 1."""
+
+
+def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) -> list[Plan]:
+    """Return the likely plans of a figure, both facings of each unless ``front`` is known."""
+    if len(anatomy.pairs) < 2:
+        return []
+    standing = [pair for pair in anatomy.pairs if anatomy.stands(pair)]
+    heights = {id(pair): float(pair.attachment @ anatomy.up) for pair in anatomy.pairs}
+    found = []
+    if is_quadruped:
+        for hind, fore in ((a, b) for a in standing[:2] for b in standing[:2] if a is not b):
+            ahead = fore.attachment - hind.attachment
+            ahead = ahead - (ahead @ anatomy.up) * anatomy.up
+            left = _signed(anatomy.lateral, np.cross(anatomy.up, ahead))
+            if front is None or float(ahead @ front) > 0.0:
+                found.append(Plan(hind, fore, left))
+        return found
+    legs = min(standing or anatomy.pairs, key=lambda pair: heights[id(pair)])
+    above = [pair for pair in anatomy.pairs if heights[id(pair)] > heights[id(legs)]]
+    longest = max((pair.length for pair in above), default=0.0)
+    # Ears, horns and capes are shorter than arms, or are attached above them.
+    arms = [pair for pair in above if pair.length >= _AS_LONG * longest]
+    for pair in sorted(arms, key=lambda pair: heights[id(pair)])[:_MOST_ARMS]:
+        for left in (anatomy.lateral, -anatomy.lateral):
+            if front is None or float(np.cross(left, anatomy.up) @ front) > 0.0:
+                found.append(Plan(legs, pair, left))
+    return found
+
+
+def feet_ahead(anatomy: Anatomy, plan: Plan, is_quadruped: bool) -> float:
+    """Return how much farther feet reach to the front of the shins than to their back.
+
+    A fraction of the figure's height; negative if the plan faces backwards, near 0 for stumps.
+    """
+    front = np.cross(plan.left, anatomy.up)
+    centers = anatomy.solid.centers(anatomy.solid.voxels)
+    ground = plan.ground(anatomy.up)
+    heights = centers @ anatomy.up - ground
+    sides = centers @ anatomy.lateral - anatomy.offset
+    pairs = [plan.lower, plan.upper] if is_quadruped else [plan.lower]
+    found = []
+    for limb in (limb for pair in pairs for limb in pair.limbs):
+        top = max(float(limb.attachment @ anatomy.up) - ground, anatomy.solid.spacing)
+        tip = limb.points[0]
+        side = float(tip @ anatomy.lateral) - anatomy.offset
+        near = (heights <= _SOLE * top + anatomy.solid.spacing) & (sides * side > 0.0)
+        near &= np.linalg.norm(centers - tip, axis=1) <= _FOOT * top
+        if not near.any():
+            continue
+        reached = np.maximum.accumulate(limb.points @ anatomy.up - ground)
+        row = min(int(np.searchsorted(reached, _SHIN * top)), len(reached) - 1)
+        shin, sole = float(limb.points[row] @ front), centers[near] @ front
+        found.append(float(sole.max()) + float(sole.min()) - 2.0 * shin)
+    return float(np.mean(found)) / anatomy.height if found else 0.0
+
+
+def _signed(vector: Floats, like: Floats) -> Floats:
+    return vector if float(vector @ like) >= 0.0 else -vector
+
+
+def body_points(anatomy: Anatomy, plan: Plan, is_quadruped: bool) -> BodyPoints:
+    """Return the points of a figure that correspond to those of another one."""
+    order = (0, 1) if float(anatomy.lateral @ plan.left) > 0.0 else (1, 0)
+    legs = [plan.lower.limbs[side] for side in order]
+    arms = [plan.upper.limbs[side] for side in order]
+    upper = _leg_points if is_quadruped else _arm_points
+    rows = [_leg_points(anatomy, limb, plan.ground(anatomy.up)) for limb in legs]
+    rows += [upper(anatomy, limb, plan.ground(anatomy.up)) for limb in arms]
+    # The root of each limb is its last point; the middle of both is in the trunk.
+    pelvis = 0.5 * (rows[0][-1, :3] + rows[1][-1, :3])
+    chest = 0.5 * (rows[2][-1, :3] + rows[3][-1, :3])
+    solid, paths = anatomy.solid, anatomy.paths
+    ends = solid.nearest(np.stack([pelvis, chest]))
+    spine = paths.to(ends[:1], ends[1:])[0][::-1]
+    rows.append(_along(anatomy, spine, _TRUNK, 0.5))
+    rows += [_head_points(anatomy, ends, is_quadruped), _tail_points(anatomy, ends, is_quadruped)]
+    table = np.concatenate(rows)
+    return BodyPoints(table[:, :3], table[:, 3], table[:, 4])
+
+
+def _along(anatomy: Anatomy, path: Ints, fractions: tuple[float, ...], weight: float) -> Floats:
+    """Return points at fractions of a path, with radius and weight: (N, 5)."""
+    points = anatomy.solid.centers(anatomy.solid.voxels[path])
+    return _sampled(points, anatomy.paths.radii[path], np.array(fractions), weight)
+
+
+def _sampled(points: Floats, radii: Floats, fractions: Floats, weight: float) -> Floats:
+    lengths = _arc_lengths(points)
+    at = fractions * lengths[-1]
+    columns = [np.interp(at, lengths, column) for column in (*points.T, radii)]
+    return np.stack([*columns, np.full(len(at), weight)], axis=1)
+
+
+def _arc_lengths(points: Floats) -> Floats:
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _arm_points(anatomy: Anatomy, limb: Limb, _ground: float) -> Floats:
+    """Return points from the tip of an arm to its junction with the trunk: (N, 5)."""
+    lengths = _arc_lengths(limb.points)
+    fractions = lengths / max(lengths[-1], anatomy.solid.spacing)
+    upper = (fractions >= _UPPER[0]) & (fractions <= _UPPER[1])
+    last = len(fractions) - 1
+    if upper.any():
+        rows = np.flatnonzero(upper)
+        narrow = int(rows[limb.radii[rows].argmin()])
+        # Half a voxel's uncertainty must not make the thinnest arms end early.
+        least = max(float(limb.radii[narrow]), anatomy.solid.spacing)
+        wide = np.flatnonzero(limb.radii[narrow:] >= _WIDER * least)
+        last = narrow + int(wide[0]) if len(wide) else last
+    kept = slice(0, max(last, 1) + 1)
+    return _sampled(limb.points[kept], limb.radii[kept], np.array(_ARM), 1.0)
+
+
+def _leg_points(anatomy: Anatomy, limb: Limb, ground: float) -> Floats:
+    """Return points of a standing leg at fractions of its height, and its tip first: (N, 5)."""
+    heights = limb.points @ anatomy.up - ground
+    top = float(limb.attachment @ anatomy.up) - ground
+    # The path may bend; the first point at each height is that of the leg.
+    reached = np.maximum.accumulate(heights)
+    at = [int(np.searchsorted(reached, fraction * top)) for fraction in _LEG]
+    rows = np.array([0, *np.minimum(at, len(heights) - 1)])
+    weights = np.ones(len(rows))
+    weights[0] = 0.5  # toes and shoes differ in length
+    return np.column_stack([limb.points[rows], limb.radii[rows], weights])
+
+
+def _head_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
+    """Return neck, middle, centre of the head, and its tip: (4, 5)."""
+    path = _end_path(anatomy, ends[1], ends[0])
+    if len(path) < 5:
+        return np.full((4, 5), np.nan)
+    if is_quadruped:
+        return _along(anatomy, path, (0.25, 0.5, 0.75, 1.0), 0.7)
+    points, radii = anatomy.solid.centers(anatomy.solid.voxels[path]), anatomy.paths.radii[path]
+    fractions = _arc_lengths(points)
+    fractions = fractions / fractions[-1]
+    low, high = np.searchsorted(fractions, _HEAD)
+    head = int(low) + int(radii[low : high + 1].argmax())
+    neck = int(radii[: head + 1].argmin())
+    rows = np.array([neck, (neck + head) // 2, head, len(path) - 1])
+    # Hats and hair move the tip, but not the centre.
+    return np.column_stack([points[rows], radii[rows], [0.7, 0.3, 1.0, 0.1]])
+
+
+def _tail_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
+    """Return points of a tail (4, 5), NaN without one."""
+    missing = np.full((4, 5), np.nan)
+    if not is_quadruped:
+        return missing
+    path = _end_path(anatomy, ends[0], ends[1])
+    points = anatomy.solid.centers(anatomy.solid.voxels[path])
+    if len(path) < 5 or _arc_lengths(points)[-1] < _TAIL * anatomy.size:
+        return missing
+    return _along(anatomy, path, (0.4, 0.6, 0.8, 1.0), 0.5)
+
+
+def _end_path(anatomy: Anatomy, start: int, other: int) -> Ints:
+    """Return the path from a place in the trunk to the farthest voxel of the plane beyond it.
+
+    ``other``: the other end of the trunk, from which the way there leads through ``start``.
+    """
+    from scipy.sparse import csgraph
+
+    solid = anatomy.solid
+    steps = solid.graph()
+    own, others = csgraph.dijkstra(steps, indices=[start, other])
+    sides = solid.centers(solid.voxels) @ anatomy.lateral - anatomy.offset
+    beyond = (others >= own + 0.5 * others[start]) & (np.abs(sides) <= 1.01 * solid.spacing)
+    beyond &= np.isfinite(own)
+    if not beyond.any():
+        return np.zeros(0, dtype=np.int32)
+    rows = np.flatnonzero(beyond)
+    tip = rows[own[rows].argmax() : own[rows].argmax() + 1].astype(np.int32)
+    return anatomy.paths.to(np.array([start]), tip)[0][::-1]
