@@ -185,12 +185,13 @@ def save_image(path: Path, pixels: Bytes) -> int:
     """Write (H, W, 4) uint8 pixels in the suffix's format, by default PNG; return the size."""
     from viewer.media.saving import save_bytes
 
-    data = _encoded(path, pixels)
+    data = encoded_image(path, pixels)
     save_bytes(path, data)
     return len(data)
 
 
-def _encoded(path: Path, pixels: Bytes) -> bytes:
+def encoded_image(path: Path, pixels: Bytes) -> bytes:
+    """Return the file of (H, W, 4) uint8 pixels in the suffix's format; see ``save_image``."""
     suffix = path.suffix.lower()
     if suffix in ("", ".png"):
         return encode_png(pixels)

@@ -160,10 +160,10 @@ def light_axes(direction: Floats) -> tuple[Floats, Floats]:
     return right, cross(direction, right)
 
 
-def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
-    """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
+def light_uniforms(view: View, lights: Lights) -> dict[str, object]:
+    """Return the uniforms of the lights and of ``shade/phong.glsl``."""
     pair, follows = (lights.key, lights.rim), lights.follow_camera
-    values = {
+    values: dict[str, object] = {
         "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)].tolist()),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
@@ -180,8 +180,14 @@ def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
     else:
         directions = [_direction(light, follows, view) for light in pair]
         values["u_light_directions"] = np.array(directions, dtype="f4").tobytes()
+    return values
+
+
+def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
+    """Set the uniforms of the lights, of the studio and of the effects that the program uses."""
+    values = light_uniforms(view, lights)
     if has_uniform(program, "u_to_studio"):
-        values["u_to_studio"] = as_uniform(_studio_axes(view, follows))
+        values["u_to_studio"] = as_uniform(_studio_axes(view, lights.follow_camera))
     set_uniforms(program, values)
     view.effects.bind(program, view.matrix)
 

@@ -111,6 +111,13 @@ def has_influence(skin: Skin) -> Bools:
     return np.bincount(owners(skin), weights=~zero, minlength=skin.n_vertices) > 0
 
 
+def joint_fractions(skin: Skin) -> Floats:
+    """Return each joint's fraction of the sum of all weights: (J,), for a figure's mean motion."""
+    sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
+    fractions: Floats = sums / (sums.sum() or 1.0)
+    return fractions
+
+
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
     """Return joints (N,) without influence; influences of auxiliary ones count for those shown."""
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import RenderError
-from viewer.rendering.gpu import program
+from viewer.rendering import shader_text
 from viewer.rendering.gpu.program import SHADING, Programs, set_uniforms
 from viewer.resources import resource
 from viewer.rig.skinning import METHODS
@@ -20,7 +20,7 @@ def shaders(tmp_path, monkeypatch):
     """A copy of the shaders that a test may break."""
     folder = tmp_path / "shaders"
     shutil.copytree(resource("shaders"), folder)
-    monkeypatch.setattr(program, "resource", lambda kind, *parts: folder.joinpath(*parts))
+    monkeypatch.setattr(shader_text, "resource", lambda kind, *parts: folder.joinpath(*parts))
     return folder
 
 

@@ -21,7 +21,8 @@ from viewer.data_classes import dataclass
 from viewer.errors import RenderError, ViewerError
 from viewer.interrupts import deferred
 from viewer.rendering.gpu.egl_devices import set_log_level
-from viewer.rendering.gpu.program import STORAGE_VERSION, Programs
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.shader_text import STORAGE_VERSION
 
 _LIBEGL, _LIBGL = "libEGL.so.1", "libGL.so.1"
 _INSTALL = "on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"

@@ -26,7 +26,13 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Shell, shell_of
 from viewer.rig.mesh import bounding_box, visible_vertices
-from viewer.rig.skin import Skin, has_influence, strongest_first, weight_sums
+from viewer.rig.skin import (
+    Skin,
+    has_influence,
+    joint_fractions,
+    strongest_first,
+    weight_sums,
+)
 from viewer.rig.skinning import Skinning, skin_used
 
 _MOST_VISIBLE = 64  # maximum number of combinations of hidden parts whose runs are cached
@@ -236,8 +242,7 @@ class SkinBuffers:
                 counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
                 ranges = np.stack([skin.starts[:-1], counts], axis=1)[sources]
                 self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
-                sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
-                self.joint_fractions = sums / (sums.sum() or 1.0)
+                self.joint_fractions = joint_fractions(skin)
                 # In float64: float32 sums deviate from 1, which displaces vertices far from the
                 # origin.
                 excess = (weight_sums(skin) - 1.0)[sources]

@@ -10,7 +10,7 @@ import moderngl
 from viewer.errors import RenderError
 from viewer.interrupts import deferred
 from viewer.rendering.options import Shading
-from viewer.resources import resource
+from viewer.rendering.shader_text import LINES_PER_FILE, compose
 
 SHADING: dict[Shading, str] = {
     "phong": "Blinn-Phong, two lights",
@@ -26,21 +26,12 @@ SHADING: dict[Shading, str] = {
 SHADING_CHOICES: dict[Shading, str] = {"auto": "Blinn-Phong, or by material", **SHADING}
 """Available shadings and their labels in menus."""
 
-STORAGE_VERSION = 430
-"""Version of OpenGL with storage buffers and compute shaders; crowds are drawn with them."""
-
 RESTS_BINDING, POSED_BINDING = 0, 1
 """Bindings of the storage buffers of ``skin.vert`` and ``mesh.vert``."""
 
 _UNUSED = object()
 """Value of uniforms that a program does not have."""
 
-_STORAGE_MACROS = {"INSTANCED", "REST_ROWS"}  # macros of shaders that read storage buffers
-_NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
-_INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
-_INCLUDES = re.compile(r"^#pragma include (\w+)[ \t]*$", re.MULTILINE)
-_CHUNK_MARK = "#pragma chunk"
-_LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
@@ -123,7 +114,7 @@ class Programs:
         """Return the compute shader ``name.comp``; the context must have ``STORAGE_VERSION``."""
         if name not in self._computed:
             files: list[str] = []
-            text = _compose(f"{name}.comp", "", files)
+            text = compose(f"{name}.comp", "", files)
             try:
                 with deferred():
                     self._computed[name] = self.context.compute_shader(text)
@@ -142,11 +133,11 @@ class Programs:
         if key not in self._cache:
             name, skin, fragment_name, chunk, middle = names
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", skin, files, vertex_macros)
+            vertex = compose(f"{name}.vert", skin, files, vertex_macros)
             fragment = None
             if fragment_name:
-                fragment = _compose(f"{fragment_name}.frag", chunk, files, fragment_macros)
-            geometry = _compose(f"{middle}.geom", "", files) if middle else None
+                fragment = compose(f"{fragment_name}.frag", chunk, files, fragment_macros)
+            geometry = compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
                 # Both stages output the fragment shader's inputs: the vertex shader's outputs are
                 # renamed.
@@ -169,7 +160,7 @@ class Programs:
         """Replace the driver's source positions by files and lines: ``0:12(5): ``, ``0(12) : ``."""
 
         def place(found: re.Match[str]) -> str:
-            file, line = divmod(int(found[1]), _LINES_PER_FILE)
+            file, line = divmod(int(found[1]), LINES_PER_FILE)
             return f"{files[file]}:{line}: " if file < len(files) else found[0]
 
         lines = [line.strip() for line in text.splitlines() if re.search(r"\berror\b", line, re.I)]
@@ -189,53 +180,3 @@ class Programs:
             computed.release()
         self._cache.clear()
         self._computed.clear()
-
-
-def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] = ()) -> str:
-    """Return a shader's text with its chunk and includes, with the line numbers of the files."""
-    # Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
-    # Mesa discards the source number after parsing.
-    base = len(files) * _LINES_PER_FILE
-    files.append(name)
-    parts = []
-    for number, line in enumerate(resource("shaders", name).read_text("utf-8").splitlines(), 1):
-        if line.startswith("#version") and not _STORAGE_MACROS.isdisjoint(defines):
-            line = f"#version {STORAGE_VERSION}"
-        include = _INCLUDE.match(line)
-        if include:
-            parts.append(_included(include[1], files))
-        elif line.strip() == _CHUNK_MARK and chunk:
-            folder = "skin" if name.endswith(".vert") else "shade"
-            parts.append(_chunk(folder, chunk, files))
-        else:
-            parts.append(f"{line}\n")
-        if line.startswith("#version"):
-            parts += [f"#define {macro}\n" for macro in defines]
-        if include or line.startswith(("#version", _CHUNK_MARK)):
-            parts.append(f"#line {base + number + 1}\n")
-    return "".join(parts)
-
-
-def _included(name: str, files: list[str]) -> str:
-    """Return the text of an include file."""
-    text = resource("shaders", "include", f"{name}.glsl").read_text("utf-8")
-    files.append(f"include/{name}.glsl")
-    return f"#line {(len(files) - 1) * _LINES_PER_FILE + 1}\n{text}"
-
-
-def _chunk(folder: str, chunk: str, files: list[str]) -> str:
-    """Return a chunk's text after required chunks, whose functions get their name as a suffix."""
-    inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
-    needs = _NEEDS.match(inner)
-    parts = [_included(name, files) for name in _INCLUDES.findall(inner)]
-    for name in needs[1].split() if needs else []:
-        parts.append(f"#define {folder} {folder}_{name}\n")
-        parts.append(_chunk(folder, name, files))
-        parts.append(f"#undef {folder}\n")
-    if needs:
-        # Preserve the line break, so that line numbers stay correct.
-        inner = f"\n{inner[needs.end() :]}"
-    inner = _INCLUDES.sub("", inner)
-    parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
-    files.append(f"{folder}/{chunk}.glsl")
-    return "".join(parts)

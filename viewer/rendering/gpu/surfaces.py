@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -47,7 +47,7 @@ _UNTEXTURED: dict[str, object] = {
 class Surface:
     """Drawing properties of the triangles of one material."""
 
-    uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}, ()))
+    uniforms: dict[str, Any] = field(default_factory=lambda: surface_uniforms(Material(), (), ()))
     """Uniforms of ``include/surface.glsl`` and ``shade/pbr.glsl``."""
     untextured: dict[str, object] = field(default_factory=dict)
     """Uniforms that differ while textures are off."""
@@ -91,7 +91,7 @@ def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
     used = {
         texture.uv_set
         for material in mesh.materials
-        for texture in _slots(material).values()
+        for texture in drawn_textures(material).values()
         if texture.image is not None and 0 < texture.uv_set <= len(mesh.other_uvs)
     }
     sets = (0, *sorted(used))
@@ -117,14 +117,14 @@ def upload_surfaces(
     for material in materials:
         found: dict[str, moderngl.Texture] = {}
         is_toon = material.shade_color is not None
-        for name, texture in _slots(material).items():
+        for name, texture in drawn_textures(material).items():
             if texture.image is None or texture.uv_set not in sets:
                 continue
             is_linear = name not in (*_COLORS, *((_MATCAP, _RIM) if is_toon else ()))
             filters = texture.is_smooth, texture.minification
             key = id(texture.image), is_linear, texture.wrap, filters
             if key not in made:
-                pixels = _mirrored(texture.image, texture.wrap)
+                pixels = joined_image(texture.image, texture.wrap)
                 new = owner.keep(picture_texture(context, pixels, notes, is_linear))
                 new.repeat_x, new.repeat_y = (side != "clamp" for side in texture.wrap)
                 usual = "linear_mipmap_linear" if texture.is_smooth else "nearest_mipmap_linear"
@@ -137,7 +137,7 @@ def upload_surfaces(
             untextured["u_has_base_factor"] = False
         surfaces.append(
             Surface(
-                uniforms=_uniforms(material, found, sets),
+                uniforms=surface_uniforms(material, found, sets),
                 untextured=untextured,
                 textures=tuple((units[name], texture) for name, texture in found.items()),
                 is_physical=material.is_physical,
@@ -149,7 +149,7 @@ def upload_surfaces(
     return surfaces
 
 
-def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
+def joined_image(image: Bytes, wrap: tuple[str, str]) -> Bytes:
     """Return an image joined with its mirror image: moderngl lacks the mirrored repeat mode."""
     if wrap[0] == "mirror":
         image = np.concatenate([image, image[:, ::-1]], axis=1)
@@ -159,7 +159,7 @@ def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
     return image
 
 
-def _slots(material: Material) -> dict[str, Texture]:
+def drawn_textures(material: Material) -> dict[str, Texture]:
     """Return the drawn textures, by the field of the material whose texture unit they use."""
     if material.shade_color is None:
         return material.textures
@@ -173,10 +173,11 @@ def _slots(material: Material) -> dict[str, Texture]:
     return kept | {name: one for name, one in others.items() if one is not None}
 
 
-def _uniforms(
-    material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
+def surface_uniforms(
+    material: Material, textures: Collection[str], sets: Sequence[int]
 ) -> dict[str, object]:
-    """Return all uniforms of a material, since programs keep the values of the previous one."""
+    """Return all uniforms of a material, of which some textures are drawn, by name of the slot."""
+    # All of them, since programs keep the values of the previous material.
     placed = _placed(material)
     channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
     slots = [sets.index(one.uv_set) if one.uv_set in sets else 0 for one in placed]
@@ -224,7 +225,7 @@ def _colors(material: Material) -> dict[str, object]:
 
 def _placed(material: Material) -> list[Texture]:
     """Return the texture of each unit; one without pixels for unused units."""
-    slots = _slots(material)
+    slots = drawn_textures(material)
     return [slots.get(name) or Texture("") for name in TEXTURES]
 
 

@@ -18,7 +18,9 @@ from viewer.rendering.gpu.upload import checked
 from viewer.rendering.options import BACKGROUNDS, Lights, parse_color
 from viewer.rendering.view import View, set_lights
 
-_BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
+GRADIENT = {"u_bottom": (0.80, 0.83, 0.86), "u_top": (0.36, 0.43, 0.52)}
+"""Uniforms of ``background.frag``: colours at the bottom and at the top, sRGB."""
+
 _CLEARED = {
     "white": (1.0, 1.0, 1.0, 1.0),
     "transparent": (0.0, 0.0, 0.0, 0.0),
@@ -70,7 +72,7 @@ class BackgroundPass:
 
     def _compute(self) -> None:
         program = self.programs.drawing("fullscreen", fragment="background")
-        set_uniforms(program, {"u_bottom": _BOTTOM, "u_top": _TOP})
+        set_uniforms(program, GRADIENT)
         if self._gradient is None:
             self._gradient = self.context.vertex_array(program, [])
         self._gradient.render(moderngl.TRIANGLES, vertices=3)

@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import Up
 from viewer.rig.mesh import box_size
 
-_LINE_COLOR = (0.20, 0.25, 0.32)
+LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
 _EXTENT = 6.0  # half the side length of the grid, relative to the scene's size
 
@@ -46,10 +46,10 @@ class GroundPass:
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
         """Draw the grid under a box, (2, 3), which defines the grid's height, step and extent."""
         program = self.programs.drawing("ground")
-        placement, values = _grid(tuple(box.ravel().tolist()), view.camera.up)
+        placement, values = grid_of(box, view.camera.up)
         set_model(program, view, placement, np.zeros(3))
         dark = background.startswith("#") and sum(parse_color(background)) < 1.2
-        color = _LINE_ON_DARK if dark else _LINE_COLOR
+        color = _LINE_ON_DARK if dark else LINE_COLOR
         set_uniforms(program, {**values, "u_line_color": color})
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
@@ -64,6 +64,11 @@ class GroundPass:
         for item in (self._ground, self._corners):
             if item is not None:
                 item.release()
+
+
+def grid_of(box: Floats, up: Up) -> tuple[Floats, Mapping[str, object]]:
+    """Return the placement, (4, 4), and the uniforms of the grid under a box, (2, 3)."""
+    return _grid(tuple(box.ravel().tolist()), up)
 
 
 @lru_cache(maxsize=16)
