@@ -37,7 +37,7 @@ PARTS = {
     "media": {"rig", "interrupts", "streams"},
     "formats": {"media", "rig", "interrupts", "streams"},
     "rendering": {"rig", "interrupts", "resources"},
-    "export": {"autorig", "formats", "media", "rig", "interrupts"},
+    "export": {"autorig", "formats", "media", "rendering", "rig", "interrupts"},
     "loading": {"formats", "models", "rig", "interrupts"},
     "app": {
         *("autorig", "export", "formats", "lint", "loading", "manual", "media", "models"),

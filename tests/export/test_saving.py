@@ -42,7 +42,7 @@ from viewer.rig.skinning import deform
 WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
 SUFFIXES = [kind.suffixes[0] for kind in WRITERS if "pose" in kind.stores]
 # The files that each exporter writes for the figure below, which has two textures.
-SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
+SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1, ".html": 1}
 # Existing files by the suffix of the output.
 BESIDE = {".skel": (".skin",)}
 

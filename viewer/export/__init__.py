@@ -161,6 +161,15 @@ EXPORTERS = {
         _MOTION,
         joints="smpl",
     ),
+    "html": Exporter(
+        "HTML page: figures and motion in any browser",
+        (".html",),
+        "mesh, weights, materials, shapes, pose correctives, motion",
+        "joint limits",
+        _BOTH,
+        stores_many=True,
+        keeps_gaps=True,
+    ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
         (FOLDER,),

@@ -1,0 +1,102 @@
+// The orbit camera of the desktop (rendering/camera.py), and its mouse, touch and wheel.
+
+const RADIANS = Math.PI / 180;
+
+class Camera {
+  constructor(header) {
+    this.header = header;
+    this.reset();
+  }
+
+  reset() {
+    Object.assign(this, this.header.camera);
+    this.target = [...this.header.camera.target];
+  }
+
+  // Right, up and backward in scene space.
+  get axes() {
+    const a = this.azimuth * RADIANS, i = this.inclination * RADIANS;
+    const [sa, ca, si, ci] = [Math.sin(a), Math.cos(a), Math.sin(i), Math.cos(i)];
+    const axes = [[ca, 0, -sa], [-si * sa, ci, -si * ca], [ci * sa, si, ci * ca]];
+    return this.header.up === "z" ? axes.map(([x, y, z]) => [x, -z, y]) : axes;
+  }
+
+  // Computes the matrices for a width and height.
+  update(width, height) {
+    const aspect = width / height, axes = this.axes;
+    // The camera was fitted to a square; higher images need more distance.
+    const distance = this.distance / Math.min(aspect, 1);
+    const eye = this.target.map((x, i) => x + distance * axes[2][i]);
+    this.view = [0, 1, 2].flatMap((i) => [axes[0][i], axes[1][i], axes[2][i], 0]).concat(
+      axes.map((axis) => -dot(axis, eye)), 1);
+    const [low, high] = this.header.box, side = low.map((x, i) => high[i] - x);
+    const middle = low.map((x, i) => 0.5 * (x + high[i]) - this.target[i]);
+    const reach = Math.hypot(...side) + Math.hypot(...middle) || distance;
+    const near = Math.max(distance - reach, 5e-3 * distance), far = distance + 20 * reach;
+    const f = 1 / Math.tan(0.5 * this.fov * RADIANS), depth = near - far;
+    this.projection = [f / aspect, 0, 0, 0, 0, f, 0, 0,
+      0, 0, (far + near) / depth, -1, 0, 0, (2 * far * near) / depth, 0];
+    this.scale = 2 * distance * Math.tan(0.5 * this.fov * RADIANS);
+    // The up axis in camera space.
+    const row = this.header.up === "z" ? 2 : 1;
+    this.up = [this.view[4 * row], this.view[4 * row + 1], this.view[4 * row + 2]];
+  }
+
+  orbit(azimuth, inclination) {
+    this.azimuth = ((((this.azimuth + azimuth + 180) % 360) + 360) % 360) - 180;
+    this.inclination = Math.min(Math.max(this.inclination + inclination, -90), 90);
+  }
+
+  // Moves the target in the image's plane, in units of the image's height.
+  pan(across, upward) {
+    const [right, up] = this.axes;
+    this.target = this.target.map((x, i) => x + this.scale * (across * right[i] + upward * up[i]));
+  }
+
+  zoom(factor) {
+    const { distance } = this.header.camera;
+    this.distance = Math.min(Math.max(this.distance * factor, 1e-3 * distance), 1e3 * distance);
+  }
+
+  // One pointer orbits, with Shift or another button it pans; two pan and zoom.
+  listen(canvas, changed) {
+    const pointers = new Map();
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      pointers.set(event.pointerId, [event.clientX, event.clientY]);
+      canvas.focus();
+    });
+    for (const name of ["pointerup", "pointercancel"])
+      canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (!pointers.has(event.pointerId)) return;
+      const height = canvas.clientHeight, before = [...pointers.values()];
+      pointers.set(event.pointerId, [event.clientX, event.clientY]);
+      const after = [...pointers.values()];
+      const [dx, dy] = [0, 1].map((i) => mean(after, i) - mean(before, i));
+      if (pointers.size > 1) {
+        this.pan(-dx / height, dy / height);
+        this.zoom(spread(before) / (spread(after) || 1) || 1);
+      } else if (event.shiftKey || event.buttons > 1) this.pan(-dx / height, dy / height);
+      else this.orbit(-0.4 * dx, 0.4 * dy);
+      changed();
+    });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+    canvas.addEventListener("wheel", (event) => {
+      // A page with this one in a frame keeps scrolling until the view has been clicked.
+      if (window.self !== window.top && document.activeElement !== canvas) return;
+      event.preventDefault();
+      this.zoom(Math.exp(Math.min(Math.max(event.deltaY, -100), 100) * 0.002));
+      changed();
+    }, { passive: false });
+    canvas.addEventListener("dblclick", () => { this.reset(); changed(); });
+  }
+}
+
+function mean(points, axis) {
+  return points.reduce((sum, point) => sum + point[axis], 0) / points.length;
+}
+
+function spread(points) {
+  return Math.hypot(points[1][0] - points[0][0], points[1][1] - points[0][1]);
+}

@@ -1,0 +1,114 @@
+"""Arrays as compressed text: rounded to integers, as differences, in planes of bytes, deflated.
+
+``decode.js`` is the reader of the page; ``unpacked`` reads the same text for the measured losses.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewer.rig.arrays import Floats
+from viewer.rig.file_record import Json
+
+_LARGEST = 2.0**30  # differences of two such integers fit into 32 bits
+_MOST_DIFFERENCES = 2  # speeds of smooth motions change little, so their second differences do not
+
+
+class Packer:
+    """Collects arrays and files; each is referred to by its index in ``items``."""
+
+    def __init__(self) -> None:
+        self.items: list[Json] = []
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, values: ArrayLike, step: ArrayLike = 1.0) -> int:
+        """Add an array (N,) or (N, C), rounded to multiples of ``step``, one or (C,)."""
+        rows = np.asarray(values, dtype=np.float64)
+        rows = rows[:, None] if rows.ndim == 1 else rows.reshape(len(rows), -1)
+        steps = np.broadcast_to(np.asarray(step, dtype=np.float64), rows.shape[1:])
+        low, high = (
+            (rows.min(axis=0), rows.max(axis=0)) if rows.size else (np.zeros(rows.shape[1]),) * 2
+        )
+        # Steps that would need more than 32 bits grow; the losses of the export show the effect.
+        steps = np.maximum(steps, (high - low) / _LARGEST)
+        middle = np.round((0.5 * low + 0.5 * high) / steps)
+        middle = np.where(np.abs(middle) < _LARGEST, 0.0, middle)
+        integers = np.round(rows / steps - middle).astype(np.int32)
+        order, coded = _shortest(integers)
+        n_planes = max(1, -(-int(coded.max(initial=0)).bit_length() // 8))
+        # The same byte of all numbers of a column: high bytes are nearly all 0.
+        planes = coded.T.astype("<u4").copy().view(np.uint8).reshape(-1, 4)[:, :n_planes]
+        item: Json = {
+            "shape": [*rows.shape],
+            "order": order,
+            "planes": n_planes,
+            "step": _short(steps),
+            "origin": _short(middle * steps),
+        }
+        return self._append(item, np.ascontiguousarray(planes.T).tobytes())
+
+    def add_file(self, data: bytes, kind: str) -> int:
+        """Add the bytes of a picture of a media type."""
+        return self._append({"type": kind, "size": len(data)}, data)
+
+    def _append(self, item: Json, data: bytes) -> int:
+        self.items.append({**item, "at": self._size})
+        self._parts.append(data)
+        self._size += len(data)
+        return len(self.items) - 1
+
+    def text(self) -> str:
+        """Return all bytes, deflated, in base64."""
+        return base64.b64encode(zlib.compress(b"".join(self._parts), 9)).decode("ascii")
+
+
+def unpacked(items: list[Json], text: str) -> list[Floats]:
+    """Return the arrays, (N, C) each, that ``decode.js`` reads from a text; empty for files."""
+    data = zlib.decompress(base64.b64decode(text))
+    found: list[Floats] = []
+    for item in items:
+        if "shape" not in item:
+            found.append(np.zeros((0, 0)))
+            continue
+        n_rows, n_columns = item["shape"]
+        count, n_planes = n_rows * n_columns, item["planes"]
+        planes = np.frombuffer(data, np.uint8, count * n_planes, item["at"]).reshape(n_planes, -1)
+        coded = np.zeros(count, np.uint32)
+        for plane, values in enumerate(planes):
+            coded |= values.astype(np.uint32) << np.uint32(8 * plane)
+        integers = (coded >> 1).astype(np.int32) ^ -(coded & 1).astype(np.int32)
+        columns = integers.reshape(n_columns, n_rows)
+        for _ in range(item["order"]):
+            columns = np.cumsum(columns, axis=1, dtype=np.int32)
+        found.append(columns.T * np.array(item["step"]) + np.array(item["origin"]))
+    return found
+
+
+def _shortest(integers: NDArray[np.int32]) -> tuple[int, NDArray[np.uint32]]:
+    """Return the number of differences that needs the fewest bits, and the coded differences."""
+    best, found, fewest = 0, _unsigned(integers), np.inf
+    for order in range(_MOST_DIFFERENCES + 1):
+        if order:
+            # The first row is its difference from 0. Sums wrap around as in 32-bit arithmetic.
+            integers = np.diff(integers, axis=0, prepend=np.zeros((1, integers.shape[1]), "i4"))
+        coded = _unsigned(integers)
+        bits = float(np.log2(coded.astype(np.float64) + 1.0).sum())
+        if bits < fewest:
+            best, found, fewest = order, coded, bits
+    return best, found
+
+
+def _unsigned(integers: NDArray[np.int32]) -> NDArray[np.uint32]:
+    """Return 0, -1, 1, -2 ... as 0, 1, 2, 3 ..., so that small numbers have few bits."""
+    return ((integers << 1) ^ (integers >> 31)).view(np.uint32)
+
+
+def _short(values: Floats) -> float | list[float]:
+    """Return one number if all are equal."""
+    numbers: list[float] = values.tolist()
+    return numbers[0] if len(set(numbers)) == 1 else numbers
