@@ -15,6 +15,7 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
 from viewer.rig.figure import Figure
+from viewer.rig.file_record import FileRecord
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import ball_skeleton
@@ -231,6 +232,18 @@ def test_figure_binds_only_the_joints_that_have_weights_in_its_own_mesh():
     skin = figure.skin
     only = replace(skin, weights=np.where(skin.joints == 1, 0.0, skin.weights))
     assert of(bound(replace(figure, skin=only), mesh), "tip").max() == 0.0
+
+
+def test_nodes_of_rigid_parts_are_no_bones():
+    joints = {**CHAIN, "cape": ("base", (0.05, 1.3, 0))}
+    mesh = joined(BAR)
+    figure = bound(skeleton_of(joints), mesh).figure
+    assert of(bound(figure, mesh), "cape").max() > 0.9
+    parts = replace(mesh, parts=("cape",), triangle_parts=np.zeros(mesh.n_triangles))
+    skinned = replace(figure, mesh=parts, record=FileRecord())
+    rigged = bound(skinned, mesh)
+    assert of(rigged, "cape").max() == 0.0
+    assert_allclose(weights_of(rigged)[:, :3], weights_of(bound(skeleton_of(CHAIN), mesh)))
 
 
 def test_limits_influences_and_posed_skeletons_are_kept():

@@ -82,7 +82,7 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
     moved, placed = _placed(source, joints, asked, solid, how.alignment)
     skeleton, posed, turn = _moved(skeleton, pose, moved)
     worlds = world_matrices(skeleton, posed)
-    bones = bones_in(solid, skeleton, turn @ worlds, _deforming(source))
+    bones = bones_in(solid, skeleton, turn @ worlds, _deforming(source), _holders(source))
     if len(bones.joints) == 0:
         size = moved.scale * _ratio(joints[asked], solid)
         raise _misplaced(source, 0, int(asked.sum()), size)
@@ -164,6 +164,19 @@ def _deforming(source: Figure) -> Bools | None:
     return found if found.mean() >= _TELLING else None
 
 
+def _holders(source: Figure) -> Bools:
+    """Return the joints (J,) that are the nodes of rigid parts, such as a sword or a cape.
+
+    Among the parts of a skinned file, such a node is a joint with the name of its part.
+    """
+    skeleton = source.require_skeleton()
+    if source.mesh is None or source.record is None or not source.record.has_skin:
+        return np.zeros(skeleton.n_joints, dtype=np.bool_)
+    parts, above = set(source.mesh.parts), set(skeleton.parents.tolist())
+    holds = [j not in above and name in parts for j, name in enumerate(skeleton.names)]
+    return np.array(holds)
+
+
 def _asked(source: Figure, skeleton: Skeleton) -> Bools:
     """Return the joints (J,) that should be inside the mesh: no roots, no controls."""
     drawn = np.zeros(skeleton.n_joints, dtype=np.bool_)
@@ -171,7 +184,7 @@ def _asked(source: Figure, skeleton: Skeleton) -> Bools:
     deforming = _deforming(source)
     if deforming is None:
         deforming = ~names_control(skeleton)
-    wanted = drawn & deforming & (skeleton.parents >= 0)
+    wanted = drawn & deforming & ~_holders(source) & (skeleton.parents >= 0)
     return wanted if wanted.any() else drawn
 
 

@@ -7,7 +7,7 @@ COMMANDS = {
     "render": "render files to an image or video, without a window",
     "convert": "write figures, poses and motions in other formats",
     "batch": "run convert, render, rig, info, diff or lint for many files, in parallel",
-    "rig": "transfer the rig of a figure to an unrigged mesh",
+    "rig": "transfer the rig of a figure to an unrigged mesh, or bind it to a skeleton",
     "info": "describe the contents of files",
     "diff": "compare figures or motions with a reference: how much they differ, where, and in "
     "which pose",

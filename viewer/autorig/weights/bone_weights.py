@@ -97,11 +97,16 @@ class BoneWeights:
 
 
 def bones_in(
-    solid: Solid, skeleton: Skeleton, worlds: Floats, deforming: Bools | None = None
+    solid: Solid,
+    skeleton: Skeleton,
+    worlds: Floats,
+    deforming: Bools | None = None,
+    holders: Bools | None = None,
 ) -> Bones:
     """Return the bones of a posed skeleton, ``worlds`` (J, 4, 4), that lie in a solid.
 
-    ``deforming`` (J,): joints that have weights in the skeleton's own figure, if it has a mesh.
+    ``deforming`` (J,): joints that have weights in the skeleton's own figure, if it has a mesh;
+    others may still be the ends of bones. ``holders`` (J,): joints that are no bones nor ends.
     """
     positions, parents = worlds[:, :3, 3], shown_parents(skeleton)
     count, space = skeleton.n_joints, solid.spacing
@@ -109,6 +114,8 @@ def bones_in(
     drawn[shown_joints(skeleton)] = True
     is_near = gaps(solid, positions) <= NEAR * space
     controlling = _controls(skeleton, positions, is_near, _SAME * space)
+    if holders is not None:
+        controlling |= holders
     plays = drawn & ~controlling
     if deforming is not None:
         plays &= deforming
