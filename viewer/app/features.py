@@ -41,7 +41,7 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.posing.toolbar import choose_tool, key_pose_now, next_orientation, no_keys
 from viewer.app.preferences.preferences_window import open_preferences
-from viewer.app.retargeting.drive_changes import no_edit, toggle_feet
+from viewer.app.retargeting.drive_changes import no_edit, toggle_feet, toggle_hands
 from viewer.app.retargeting.joint_match_panel import (
     ask_for_map,
     ask_where_to_save,
@@ -151,6 +151,7 @@ ACTIONS = (
     Action("Save joint map…", ask_where_to_save, no_drive),
     Action("Show all parts", show_all_parts, no_parts),
     Action("Feet on the ground", toggle_feet, no_edit),
+    Action("Hands at the body", toggle_hands, no_edit),
     Action("Springs", toggle_springs, no_springs),
     Action("Reset lights", reset_lights),
     Action("Axis gizmo", toggle_gizmo),

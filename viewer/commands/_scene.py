@@ -149,7 +149,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: GapUse = "check
     add_settings(group, MotionSettings, "model", "gender")
     add_settings(group, SceneOptions, "motion_files")
     add_settings(group, MotionSettings, "source_rest", type=_source_rest)
-    add_settings(group, MotionSettings, "feet")
+    add_settings(group, MotionSettings, "feet", "hand_contact")
     add_settings(group, SceneOptions, "joint_map")
     names = "up", "unit", "images", "video", "space", "average_shape", "layout"
     add_settings(group, MotionSettings, *names, "legacy_expression", "drives")

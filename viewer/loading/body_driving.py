@@ -57,6 +57,7 @@ def body_drive(
     up: str,
     joint_map: JointMap | None = None,
     plants_feet: bool = True,
+    keeps_hands: bool = True,
 ) -> Drive:
     """Return a body's motion as one that drives figures; ``up``: its world's axis, y, z, -y, -z."""
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
@@ -65,5 +66,6 @@ def body_drive(
         joint_map=joint_map,
         keeps_up=True,
         plants_feet=plants_feet,
+        keeps_hands=keeps_hands,
         hangs=up.startswith("-"),
     )

@@ -88,6 +88,8 @@ class Builder:
     name."""
     plants_feet: bool = True
     """Whether the feet of the target still have to be planted."""
+    keeps_hands: bool = True
+    """Whether hands of the target stay at its body."""
     hangs: bool = False
     """Whether the axis along which people stand points down before placement."""
     defers: bool = False
@@ -212,7 +214,7 @@ class Builder:
     def _drive(self, model: Figure, clip: SampledClip) -> Drive:
         # Feet are planted at the end, because contacts and the ground need the whole motion.
         up = f"-{self.up}" if self.hangs else self.up
-        return body_drive(model, clip, up, self.joint_map, plants_feet=False)
+        return body_drive(model, clip, up, self.joint_map, False, self.keeps_hands)
 
     def _finished(self) -> list[Diagnostic]:
         """At the end, compute the whole motions of driven figures and plant their feet, once."""

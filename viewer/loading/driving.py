@@ -218,7 +218,9 @@ def _carried(
 ) -> Actor:
     """Return an actor of a figure with other joints that a body moves."""
     assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
-    drive = body_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
+    drive = body_drive(
+        actor.figure, actor.clip, up, settings.joint_map, settings.feet, settings.hand_contact
+    )
     try:
         clip, notes = driven_clip(drive, target)
     except RigError as problem:
@@ -237,6 +239,7 @@ def _drives_character(
         SkeletonMotion(body, actor.clip),
         joint_map=settings.joint_map,
         plants_feet=settings.feet,
+        keeps_hands=settings.hand_contact,
         hangs=up.startswith("-"),
     )
     return drive_somebody(path, drive, draft, actor.placement)[0]
@@ -293,7 +296,7 @@ def _begin_capture(path: Path, capture: Capture, draft: SceneDraft, models: Body
         up = up or _judged_up(path, builder.actors, draft, usual="z")
         builder.place(up)
         builder.swings, builder.joint_map = settings.springs, settings.joint_map
-        builder.plants_feet = settings.feet
+        builder.plants_feet, builder.keeps_hands = settings.feet, settings.hand_contact
         _carry(builder, draft, choice.target, drives=choice.drives and settings.drives)
         if builder.target is not None or body is choice.figure:
             break

@@ -113,6 +113,15 @@ class MotionSettings:
         given="on",
         read="on".__eq__,
     )
+    hand_contact: bool = setting(
+        True,
+        "keep the hands of driven figures at the body while the hands of the motion are at theirs "
+        "(default: on)",
+        flag="--hand-contact",
+        choices=("on", "off"),
+        given="on",
+        read="on".__eq__,
+    )
     joint_map: JointMap | None = None
     """Joints of driven figures and the joints that drive them; None to match them by name."""
 

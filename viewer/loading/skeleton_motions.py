@@ -77,6 +77,7 @@ def give_skeleton_motion(
         settings.source_rest,
         settings.joint_map,
         plants_feet=settings.feet,
+        keeps_hands=settings.hand_contact,
         hangs=settings.up.startswith("-"),
     )
     if settings.drives and model is not None:
@@ -266,7 +267,12 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
             motion = _motion_of(figure, wanted)
         except RigError:
             continue  # reported when the animations are started
-        drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
+        drive = Drive(
+            motion,
+            joint_map=settings.joint_map,
+            plants_feet=settings.feet,
+            keeps_hands=settings.hand_contact,
+        )
         path = actor.file or Path(figure.name)
         if drive_somebody(path, drive, draft, np.eye(4), others)[0]:
             draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))

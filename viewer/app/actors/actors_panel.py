@@ -18,7 +18,13 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     visible_rows,
 )
-from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
+from viewer.app.retargeting.drive_changes import (
+    keeps_hands,
+    no_edit,
+    plants_feet,
+    toggle_feet,
+    toggle_hands,
+)
 from viewer.phrases import printable
 from viewer.rig.captures.keypoint_layouts import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
@@ -72,6 +78,12 @@ def draw(state: AppState) -> None:
         explain(
             "keep feet in place, with their soles on the ground, while the feet of the source "
             "motion do not move"
+        )
+        is_on = keeps_hands(state)
+        if checkbox(state, "Hands at the body", is_on, why) != is_on:
+            toggle_hands(state)
+        explain(
+            "keep hands at hips, thighs, head or each other where those of the source motion are"
         )
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted("Camera follows")

@@ -114,14 +114,35 @@ def plants_feet(state: AppState) -> bool:
 
 def toggle_feet(state: AppState) -> None:
     """Switch planted feet on or off for the chosen actor and all people of its capture."""
-    if no_edit(state):
-        state.say_status(no_edit(state))
-        return
-    if state.actor.clip is None:
-        state.say_status(NOT_DRIVEN)
+    if not _can_change(state):
         return
     is_on = not plants_feet(state)
     text = f"Feet: {'kept on the ground' if is_on else 'as retargeted'}"
     change_drive(
         state, lambda drive: replace(drive, plants_feet=is_on), lambda: state.say_status(text)
     )
+
+
+def keeps_hands(state: AppState) -> bool:
+    """Return whether hands of the chosen actor stay at its body, or will after retargeting."""
+    drive = shown_drive(state, state.actor)
+    return drive is not None and drive.keeps_hands
+
+
+def toggle_hands(state: AppState) -> None:
+    """Switch hands at the body on or off for the chosen actor and all people of its capture."""
+    if not _can_change(state):
+        return
+    is_on = not keeps_hands(state)
+    text = f"Hands: {'kept at the body' if is_on else 'as retargeted'}"
+    change_drive(
+        state, lambda drive: replace(drive, keeps_hands=is_on), lambda: state.say_status(text)
+    )
+
+
+def _can_change(state: AppState) -> bool:
+    """Return whether the motion of the chosen actor can be computed again; say why not."""
+    why = no_edit(state) or ("" if state.actor.clip is not None else NOT_DRIVEN)
+    if why:
+        state.say_status(why)
+    return not why

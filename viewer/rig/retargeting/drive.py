@@ -24,6 +24,8 @@ class Drive:
     """Whether the result has the up axis of the motion's world instead of the figure's up axis."""
     plants_feet: bool = True
     """Whether feet stay planted while the source's feet are on the ground."""
+    keeps_hands: bool = True
+    """Whether hands stay at the body while the source's hands are at its own."""
     hangs: bool = False
     """Whether the up axis of the motion points down."""
     finish: Callable[[SampledClip], SampledClip] | None = None

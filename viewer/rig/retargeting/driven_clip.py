@@ -15,6 +15,7 @@ from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_feet import feet_notes, plant_feet
+from viewer.rig.retargeting.driven_hands import hand_notes, keep_hands
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.limb_hierarchy import limb_figure
@@ -38,6 +39,9 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     if drive.plants_feet:
         clip, changes = plant_feet(found, body, drive.hangs)
         notes = notes + feet_notes(changes, found, body)
+    if drive.keeps_hands:
+        clip, kept = keep_hands(found, clip, body)
+        notes = notes + hand_notes(kept, found, body)
     if limbs is not None:
         clip = limbs.original_clip(clip, figure)
     up = drive.motion.figure.up

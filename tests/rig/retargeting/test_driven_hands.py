@@ -1,0 +1,156 @@
+"""Hands of driven figures, kept at the body where those of the source are at theirs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.retargeting.rest_twins import NAMES, PERSON, Y, Z, t_pose, worlds, written
+from rig.retargeting.two_people import figure_of, places
+
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
+from viewer.rig.mesh import Mesh
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.driven_hands import keep_hands
+from viewer.rig.retargeting.retarget import retarget
+from viewer.rig.skin import skin_from_lists
+
+N = 40
+ARM, ELBOW, HAND = ("LeftArm", "LeftForeArm", "LeftHand")
+# The height from ankles to neck: thigh 45, shin with the ankle 2 behind it, and pelvis to neck.
+HEIGHT = 45.0 + np.hypot(42.0, 2.0) + 50.0
+
+
+def body(arms: float = 1.0, width: float = 1.0, height: float = 1.0):
+    """Return a person with longer arms, wider shoulders and hips, scaled by a height."""
+    table = {name: (parent, np.array(place, float)) for name, (parent, place) in PERSON.items()}
+    for name, (parent, place) in table.items():
+        if name.endswith(("Arm", "ForeArm", "Hand", "Shoulder")):
+            sign = np.sign(place[0])
+            root = sign * 18.0
+            place[0] = root * width + arms * (place[0] - root) if abs(place[0]) > 18 else (
+                place[0] * width
+            )  # fmt: skip
+        if name.endswith(("UpLeg", "Leg", "Foot", "ToeBase")):
+            place[0] *= width
+        table[name] = (parent, height * place)
+    names = {name: f"{name}_" for name in table}
+    return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
+
+
+def motion(bend: float, swing: float):
+    """Return arms that hang down, elbows that bend in ``swing`` radians around ``bend``."""
+    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
+    phase = np.linspace(0.0, 2.0 * np.pi, N)
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        local[:, NAMES.index(f"{side}Arm")] = matrices(-sign * 1.5 * Z)
+        turns = -sign * Y * (bend + swing * np.sin(phase))[:, None]
+        local[:, NAMES.index(f"{side}ForeArm")] = matrices(turns)
+    return written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+
+
+def kept(figure, source):
+    found = retarget(source, figure, source_rest="auto")
+    return found, *keep_hands(found, found.clip, figure)
+
+
+def from_thigh(where, side="Left", suffix="_"):
+    """Return the offset of a wrist from the nearest point of its thigh: (N, 3)."""
+    wrist, hip, knee = (where[f"{side}{part}{suffix}"] for part in ("Hand", "UpLeg", "Leg"))
+    bone = knee - hip
+    part = np.einsum("na,na->n", wrist - hip, bone) / np.einsum("na,na->n", bone, bone)
+    return wrist - hip - np.clip(part, 0.0, 1.0)[:, None] * bone
+
+
+def test_hands_beside_the_thighs_stay_there_in_a_figure_with_wide_shoulders():
+    source = motion(0.3, 0.2)
+    figure = body(width=1.5)
+    found, clip, changes = kept(figure, source)
+    theirs = from_thigh(places(source.figure, source.clip), suffix="")
+    near = np.linalg.norm(theirs, axis=1) < 0.13 * HEIGHT
+    assert near.sum() > 10
+    wrong = [
+        np.linalg.norm(from_thigh(places(figure, each)) - theirs, axis=1)[near] / HEIGHT
+        for each in (found.clip, clip)
+    ]
+    # The shoulders are 9 cm wider, the thighs 5, so that hands are 4 of 137 cm too far out; up to
+    # 0.025 are left.
+    assert wrong[0].max() > 0.028 and wrong[1].max() < 0.0255
+    assert changes.after < changes.before
+    bones = [(ARM, ELBOW), (ELBOW, HAND)]
+    before, after = places(figure, found.clip), places(figure, clip)
+    for start, end in bones:  # bones keep their lengths
+        lengths = [np.linalg.norm(w[f"{end}_"] - w[f"{start}_"], axis=1) for w in (before, after)]
+        assert_allclose(*lengths, atol=1e-9)
+
+
+@pytest.mark.parametrize("height", [1.0, 0.02, 3.0])
+def test_figure_with_the_proportions_of_the_source_is_unchanged(height):
+    found, clip, changes = kept(body(height=height), motion(0.3, 0.2))
+    assert changes is None and clip is found.clip
+
+
+def test_hands_away_from_the_body_are_unchanged():
+    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
+    local[:, NAMES.index("LeftForeArm")] = matrices(np.linspace(0.0, 0.5, N)[:, None] * -Y)
+    source = written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    found, clip, changes = kept(body(arms=1.4, width=1.4), source)
+    assert changes is None and clip is found.clip
+
+
+def test_hands_that_clap_meet_in_a_figure_with_long_arms():
+    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
+    apart = 0.3 + 0.3 * np.cos(np.linspace(0.0, 4.0 * np.pi, N))
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        # Upper arms forwards and down, forearms inwards until the wrists meet.
+        local[:, NAMES.index(f"{side}Arm")] = matrices(-sign * 1.3 * Y)
+        inwards = -sign * (1.316 - apart)[:, None] * Y
+        local[:, NAMES.index(f"{side}ForeArm")] = matrices(inwards)
+    source = written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    figure = body(arms=1.6)
+    found, clip, _ = kept(figure, source)
+
+    def between(where, suffix=""):
+        return where[f"LeftHand{suffix}"] - where[f"RightHand{suffix}"]
+
+    theirs = between(places(source.figure, source.clip))
+    met = np.linalg.norm(theirs, axis=1) < 0.07 * HEIGHT
+    assert met.any()
+    wrong = [
+        np.linalg.norm(between(places(figure, each), "_") - theirs, axis=1)[met].max() / HEIGHT
+        for each in (found.clip, clip)
+    ]
+    # With arms of 45 and 42 cm, the wrists cross by 12 cm where those of the source are 6 apart.
+    assert wrong[0] > 0.12 and wrong[1] < 0.0251
+
+
+def test_hands_stay_outside_of_a_stout_body():
+    # A ring of vertices 22 cm around each thigh, all bound to the thigh.
+    figure = body()
+    names = list(figure.skeleton.names)
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = 22.0 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+    sides = ("Left", "Right")
+    positions = np.concatenate([ring + np.array([10.0 * s, 75.0, 0.0]) for s in (1, -1)])
+    rows = [[(names.index(f"{side}UpLeg_"), 1.0)] for side in sides for _ in angle]
+    bind = np.tile(np.eye(4), (len(names), 1, 1))
+    mesh = Mesh(positions, 0.0 * positions, np.arange(24, dtype=np.int32).reshape(-1, 3))
+    stout = replace(figure, mesh=mesh, skin=skin_from_lists(rows, bind))
+    source = motion(0.3, 0.2)
+    found, clip, _ = kept(stout, source)
+    before = np.linalg.norm(from_thigh(places(stout, found.clip)), axis=1)
+    after = np.linalg.norm(from_thigh(places(stout, clip)), axis=1)
+    assert (after >= np.minimum(before, 22.0) - 0.025 * HEIGHT - 1e-6).all()
+
+
+def test_hands_can_be_left_as_retargeted_and_are_reported():
+    drive = Drive(motion(0.3, 0.2), "auto", plants_feet=False)
+    figure = body(width=1.5)
+    _, notes = driven_clip(drive, figure)
+    (text,) = [str(note) for note in notes if note.key == "F007.hands-kept"]
+    assert "they miss by 2." in text and "--hand-contact off disables this" in text
+    clip, notes = driven_clip(replace(drive, keeps_hands=False), figure)
+    assert not [note for note in notes if note.key == "F007.hands-kept"]
+    plain = retarget(drive.motion, figure, source_rest="auto").clip
+    assert_allclose(clip.rotations, plain.rotations, atol=1e-12)
