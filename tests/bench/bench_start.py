@@ -14,7 +14,7 @@ Limits, in ms of processor time of the main thread on two 2.5 GHz cores:
 
 - ``viewer info``: 10 for Python, 67 for numpy, 16 for 78 modules of this project at 0.2 each, 10
   for argparse, signals and typing, 5 for the file. Python cannot load these modules faster.
-- ``viewer render``: 36 for 137 modules of this project, 7 for pyrr, 12 to read the files, 7 for the
+- ``viewer render``: 36 for 141 modules of this project, 7 for pyrr, 12 to read the files, 7 for the
   camera, 9 to detect that the surface is closed (which saves as much when it is drawn), 12 to skin,
   9 for background and grid, 12 to free Python's objects at exit. Mesa's driver in software compiles
   the shader that makes mipmaps anew in each process, 100: its cache does not keep it. A minimal

@@ -339,3 +339,28 @@ def test_target_is_reused_for_the_same_size_and_samples(scene):
         first = offscreen.target((64, 48), 4)
         assert offscreen.target((64, 48), 4) is first
         assert offscreen.target((64, 48), 1) is not first
+
+
+def test_frame_writes_only_uniforms_that_changed(monkeypatch):
+    written, write = [], moderngl.Uniform.write
+
+    def noting(uniform, data):
+        written.append(uniform.name)
+        write(uniform, data)
+
+    scene, options = viewer.load(), DisplayOptions()
+    camera, box = default_camera(scene, (32, 24)), scene_box(scene)
+    monkeypatch.setattr(moderngl.Uniform, "write", noting)
+    with Offscreen() as offscreen:
+        for _ in range(2):  # the second frame stores the background
+            first = offscreen.render(scene, (32, 24), camera, options, box)
+        written.clear()
+        np.testing.assert_array_equal(
+            offscreen.render(scene, (32, 24), camera, options, box), first
+        )
+        assert not written
+        camera.azimuth += 90.0
+        turned = offscreen.render(scene, (32, 24), camera, options, box)
+    assert (turned != first).any()
+    # Those of the surface and of the grid: lights follow the camera, and its lens is the same.
+    assert sorted(written) == ["u_model_view", "u_model_view", "u_normal_matrix", "u_up"]
