@@ -28,7 +28,7 @@ from viewer.autorig.weights.bone_weights import (
     names_control,
 )
 from viewer.autorig.weights.result import RigidIslands, WeightTransfer, rigid_lines
-from viewer.autorig.weights.weight_transfer import skin_of, smooth
+from viewer.autorig.weights.weight_transfer import WeightSettings, skin_of, smooth
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed, printable, rounded
@@ -90,21 +90,10 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         weigh, title = _METHODS[how.method]
         found = weigh(mesh, solid, bones)
     report_fraction(0.9, "checking the result")
-    rows = found.rows
-    if how.weights.smoothing_rounds:
-        active = found.rigid[mesh.islands] < 0
-        rows = smooth(rows, mesh.triangles, active, how.weights.smoothing_rounds)
-    skin = skin_of(rows, _inverse(source, skeleton, worlds), how.weights.max_influences)
-    skin = skin_rows(skin, mesh.vertices)
-    rotation = turn[:3, :3]
-    own = target
-    if not np.array_equal(rotation, np.eye(3)):
-        own = replace(
-            target, positions=target.positions @ rotation, normals=target.normals @ rotation
-        )
+    skin = _skin(mesh, found, _inverse(source, skeleton, worlds), how.weights)
     figure = Figure(
         name=name,
-        mesh=own,
+        mesh=_turned_back(target, turn[:3, :3]),
         skeleton=skeleton,
         skin=skin,
         up=source.up,
@@ -140,6 +129,23 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         max_influences=how.weights.max_influences,
     )
     return with_fields(rigged, ("sees a bone", "diffused", "rigid"), "Distance to the bone")
+
+
+def _skin(mesh: Welded, found: BoneWeights, inverse: Floats, how: WeightSettings) -> Skin:
+    """Return weights of a welded mesh as the skin of the original vertices."""
+    rows = found.rows
+    if how.smoothing_rounds:
+        active = found.rigid[mesh.islands] < 0
+        rows = smooth(rows, mesh.triangles, active, how.smoothing_rounds)
+    return skin_rows(skin_of(rows, inverse, how.max_influences), mesh.vertices)
+
+
+def _turned_back(mesh: Mesh, rotation: Floats) -> Mesh:
+    """Return a mesh rotated to the axes of a skeleton that ``rotation`` would rotate to it."""
+    if np.array_equal(rotation, np.eye(3)):
+        return mesh
+    # v' = R^-1 v: the vectors are rows, so they are multiplied by R.
+    return replace(mesh, positions=mesh.positions @ rotation, normals=mesh.normals @ rotation)
 
 
 def _one_sided(mesh: Welded) -> Welded:
