@@ -235,8 +235,15 @@ class Reaching:
         self._target = np.asarray(target, dtype=np.float64)
         self._wanted = self._within(self._target, 0.0)
         goal = self._nearest(self._goal, rounds, 0.0)[0]
-        bent = self._bent(goal)
-        self._goal = goal if bent is None else self._nearest(bent, rounds, 0.0)[0]
+        # A pose that limits hold may be left from one in the middle of them.
+        middle = self._goal.values.copy()
+        both = np.isfinite(self._low) & np.isfinite(self._high)
+        middle[both] = 0.5 * (self._low[both] + self._high[both])
+        for other in (self._bent(goal), self._goal.at(middle)):
+            if other is not None and self._left(goal) > _MISSED * self._size:
+                other = self._nearest(other, rounds, 0.0)[0]
+                goal = other if self._left(other) < self._left(goal) else goal
+        self._goal = goal
         return self._result(self._goal, True)
 
     def follow(self, target: Floats) -> Reach:
