@@ -151,9 +151,14 @@ def test_shapes_and_correctives_move_the_rest_vertices(browser, tmp_path):
 
 
 @needs_chromium
-def test_smpl_body_in_motion(browser, tmp_path):
+@pytest.mark.parametrize("changes", [False, True])
+def test_smpl_body_in_motion_with_its_shape(browser, tmp_path, changes):
+    """Shapes move the joints, too; in the second motion they change from frame to frame."""
     figure = family_figure("smpl", tmp_path)
-    (animation,), _ = write(tmp_path / "a.html", moving(figure))
+    random = np.random.default_rng(4)
+    shapes = random.normal(size=(5 if changes else 1, figure.n_shapes)) * 2.0
+    actor = moving(figure, shapes=np.broadcast_to(shapes, (5, figure.n_shapes)))
+    (animation,), _ = write(tmp_path / "a.html", actor)
     browser.open(tmp_path / "a.html")
     check_frames(browser, animation, Skinning(), [0, 3])
 

@@ -155,7 +155,7 @@ class _Shown:
         if figure.mesh is not None and figure.mesh.n_vertices:
             packed["mesh"], center = pack_mesh(self.tracks, actor.hidden_parts, packer, notes)
             if figure.is_attached:
-                packed["skin"] = pack_skin(figure.require_skin(), how, packer)
+                packed["skin"] = pack_skin(rest.require_skin(), how, packer)
                 packed["skin"]["isAffine"] = "stretches" in packed["motion"]
         if any(material.is_physical for material in (figure.mesh.materials if figure.mesh else ())):
             notes.append("metallic-roughness surfaces are shown with Blinn-Phong shading")
