@@ -242,7 +242,7 @@ CODES: dict[str, Code] = {
     "R004": Code(
         "warning",
         "poor fit of pose or proportions, or front and back that look alike",
-        "choose a template of the same kind as the target, or specify --facing",
+        "choose a template of the same kind as the target, or state its front",
     ),
     "R005": Code("note", "matched weights", "none if most vertices are matched"),
     "R006": Code(
