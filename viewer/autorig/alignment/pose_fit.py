@@ -67,6 +67,7 @@ _HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
 
 # Penalties on the squares of total rotations (radians) and total growths (logarithms).
 _ROTATED, _GROWN = 3e-6, 3e-5
+_TWISTED = 1e-4  # the former if there are marks
 _NOW = 1e-5  # penalty on rotations and growths within one iteration
 _WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
 
@@ -345,7 +346,8 @@ def solve_step(
             )
             matrix += more
             right += values
-    penalty = _penalties(len(below), n_joints)
+    # Marks along a limb leave its rotation about its own axis to chance, as a round head does.
+    penalty = _penalties(len(below), n_joints, _ROTATED if marks is None else _TWISTED)
     right[7:] -= penalty @ np.concatenate([rotated[below].ravel(), grown.ravel()])
     matrix[7:, 7:] += penalty
     now = np.full(len(right), _NOW)
@@ -364,9 +366,9 @@ def solve_step(
     return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
 
-def _penalties(n_rotating: int, n_joints: int) -> Floats:
+def _penalties(n_rotating: int, n_joints: int, rotated: float) -> Floats:
     """Return the penalties on all rotations and growths as a quadratic form."""
-    penalties = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
+    penalties = np.diag(np.repeat([rotated, _GROWN], [3 * n_rotating, 2 * n_joints]))
     # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised. All limbs
     # become thicker under clothes; otherwise the figure as a whole would grow instead, and extend
     # beyond the target.
