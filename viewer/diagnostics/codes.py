@@ -208,9 +208,7 @@ CODES: dict[str, Code] = {
         "body of another model",
         Remedy("open its own model first", "choose its own model (--model, --gender)"),
     ),
-    "C020": Code(
-        "warning", "joint pops", "delete or smooth the keys of these frames (--smooth of convert)"
-    ),
+    "C020": Code("warning", "joint pops", "delete the keys of these frames, or smooth them"),
     "C021": Code("warning", "frozen frames", "delete them, or interpolate between their ends"),
     "C022": Code("warning", "bones change length", "delete the translation keys of these joints"),
     "C023": Code("warning", "joints change size", "delete the scale keys unless intended"),
