@@ -21,6 +21,7 @@ PAGES = {
     "video": "results of video motion capture: GVHMR, WHAM, 4D-Humans, TRAM and others",
     "weights": "inspect, check and compare weights and rigs",
     "rigging": "give a mesh the rig of a figure",
+    "pages": "one HTML file that shows figures in any browser",
     "batches": "many files: batches, reports, grading, clusters",
     "window": "panels, tools and the mouse",
     "python": "the Python API",

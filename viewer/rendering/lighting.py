@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 # Fraction of light removed; the remainder represents light reflected by other surfaces.
-_SHADOW_STRENGTH = 0.9
+SHADOW_STRENGTH = 0.9
 _BLUR = 0.011  # filter radius on the ground relative to a figure's size, if passes are averaged
 
 
@@ -91,7 +91,7 @@ class Lighting:
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
             shadow = self._shadow_pass(size).draw(
-                casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
+                casters.draw, self._spheres, direction, SHADOW_STRENGTH * strength
             )
             # The shadows of different passes are offset on the ground and must overlap.
             blur = _BLUR * casters.largest_mesh() if n_passes(options) > 1 else 0.0

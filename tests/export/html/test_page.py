@@ -201,6 +201,7 @@ def test_controls_play_orbit_and_show_weights(browser, tmp_path):
     browser.mouse("Moved", 250, 120, button="left", buttons=1)
     browser.mouse("Released", 250, 120, button="left")
     browser.mouse("Wheel", 200, 120, deltaX=0, deltaY=-100)
+    browser.settle()
     turned, nearer = browser.run(camera)
     assert turned == pytest.approx(azimuth - 20.0) and nearer < 0.9 * distance
     touches = [{"x": 150, "y": 120, "id": 0}, {"x": 200, "y": 120, "id": 1}]
@@ -208,6 +209,7 @@ def test_controls_play_orbit_and_show_weights(browser, tmp_path):
     touches[1]["x"] = 300
     browser.send("Input.dispatchTouchEvent", type="touchMove", touchPoints=touches)
     browser.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    browser.settle()
     assert browser.run(camera)[1] < 0.5 * nearer
     for key in ("End", "s", "w"):
         browser.send("Input.dispatchKeyEvent", type="keyDown", key=key, text=key[:1])
@@ -231,7 +233,7 @@ def test_controls_play_orbit_and_show_weights(browser, tmp_path):
 
 @needs_chromium
 def test_picture_matches_the_desktop(browser, tmp_path):
-    """The same fox from the same camera, without shadows: only edges of pixels differ."""
+    """The same fox from the same camera: only edges and the contact shadow differ."""
     assert run(["convert", "-o", str(tmp_path / "fox.html")]) == 0
     browser.open(tmp_path / "fox.html")
     browser.run("document.getElementById('display').hidden = true")
@@ -240,8 +242,7 @@ def test_picture_matches_the_desktop(browser, tmp_path):
     height, width = found.shape[:2]
     size = f"{width}x{height}"
     picture = tmp_path / "fox.png"
-    wanted = ["render", "-o", str(picture), "--size", size, "--quality", "normal", "--no-shadows"]
-    assert run(wanted) == 0
+    assert run(["render", "-o", str(picture), "--size", size, "--quality", "normal"]) == 0
     own = np.asarray(Image.open(picture).convert("RGB"), dtype=float)
     apart = np.abs(found - own).max(axis=-1)
     assert np.median(apart) <= 2.0 and (apart > 24.0).mean() < 0.02

@@ -35,12 +35,14 @@ from viewer.phrases import counted, file_size, listed
 from viewer.progress import report
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.colors import colormap
+from viewer.rendering.lighting import SHADOW_STRENGTH
 from viewer.rendering.options import DisplayOptions, Lights
 from viewer.rendering.passes.background_pass import GRADIENT
 from viewer.rendering.passes.ground_pass import LINE_COLOR, grid_of
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
+from viewer.rendering.passes.shadow_passes import GRAZING, SHADOW_OPACITY
 from viewer.rendering.shader_text import embedded_text
-from viewer.rendering.view import light_uniforms, view_of
+from viewer.rendering.view import FILTER_RADIUS, light_uniforms, view_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -56,6 +58,7 @@ _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")
 _SEEN = 9  # frames that are framed, measured and shown as still pictures at most
 _POSTER = (960, 540)
+_ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fit
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
@@ -238,8 +241,10 @@ def _shown(part: Part, options: ExportOptions, first: float) -> tuple[_Shown, li
 def _stage(scene: Scene, points: Floats) -> Json:
     """Return the members of the header about camera, lights, ground and background."""
     camera, box = facing_camera(guess_front(scene), scene.up), bounding_box(points)
-    # For a square; the page steps back where it is higher than wide.
-    fit(camera, points, 1.0)
+    distances = []
+    for aspect in _ASPECTS:
+        fit(camera, points, aspect)
+        distances.append(camera.distance)
     lights = light_uniforms(view_of(camera, (1, 1), box), Lights())
     placement, values = grid_of(box, scene.up)
     grid = {**values, "u_line_color": LINE_COLOR}
@@ -248,12 +253,18 @@ def _stage(scene: Scene, points: Floats) -> Json:
         "box": box.tolist(),
         "camera": {
             "target": camera.target.tolist(),
-            "distance": camera.distance,
+            "distances": distances,
             "azimuth": camera.azimuth,
             "inclination": camera.inclination,
             "fov": camera.fov,
         },
         "lights": {name: plain(name, value) for name, value in lights.items()},
+        "shadow": {
+            "radius": FILTER_RADIUS,
+            "strength": SHADOW_STRENGTH,
+            "opacity": SHADOW_OPACITY,
+            "grazing": list(GRAZING),
+        },
         "background": {name: plain(name, value) for name, value in GRADIENT.items()},
         "ground": {
             "placement": placement.T.reshape(-1).tolist(),
@@ -267,14 +278,17 @@ def _programs(figures: Sequence[Json]) -> Json:
     found: Json = {
         "background": [embedded_text("fullscreen.vert"), embedded_text("background.frag")],
         "ground": [embedded_text("ground.vert"), embedded_text("ground.frag")],
+        "patch": [embedded_text("patch.vert"), embedded_text("ground_shadow.frag")],
         "lines": [embedded_text("edge.vert"), embedded_text("line.frag")],
     }
     for figure in figures:
         if "mesh" not in figure:
             continue
         macros = ("MATERIALS",) if figure["mesh"]["hasMaterials"] else ()
-        surface = embedded_text("mesh.frag", "phong", macros)
-        found["-".join(("mesh", *macros))] = [embedded_text("mesh.vert", "", macros), surface]
+        vertex = embedded_text("mesh.vert", "", macros)
+        surface = embedded_text("mesh.frag", "phong", (*macros, "SHADOWS"))
+        found["-".join(("mesh", *macros))] = [vertex, surface]
+        found["-".join(("depth", *macros))] = [vertex, embedded_text("depth.frag", "", macros)]
         if "skin" in figure:
             skin, affine = figure["skin"], ("AFFINE_PALETTE",) * figure["skin"]["isAffine"]
             text = embedded_text("skin.vert", skin["method"], affine)

@@ -9,8 +9,18 @@ class Camera {
   }
 
   reset() {
-    Object.assign(this, this.header.camera);
+    const { azimuth, inclination, fov } = this.header.camera;
+    Object.assign(this, { azimuth, inclination, fov });
     this.target = [...this.header.camera.target];
+    this.factor = 1;
+  }
+
+  // The distance at which everything is visible; known for three ratios of width and height.
+  fitted(aspect) {
+    const { distances } = this.header.camera, place = Math.log2(aspect) + 1;  // 0 at 1 : 2
+    if (place <= 0) return (distances[0] * 0.5) / aspect;
+    const low = Math.min(Math.floor(place), 1), part = Math.min(place - low, 1);
+    return distances[low] + part * (distances[low + 1] - distances[low]);
   }
 
   // Right, up and backward in scene space.
@@ -24,9 +34,10 @@ class Camera {
   // Computes the matrices for a width and height.
   update(width, height) {
     const aspect = width / height, axes = this.axes;
-    // The camera was fitted to a square; higher images need more distance.
-    const distance = this.distance / Math.min(aspect, 1);
+    this.distance = this.factor * this.fitted(aspect);
+    const distance = this.distance;
     const eye = this.target.map((x, i) => x + distance * axes[2][i]);
+    this.eye = eye;
     this.view = [0, 1, 2].flatMap((i) => [axes[0][i], axes[1][i], axes[2][i], 0]).concat(
       axes.map((axis) => -dot(axis, eye)), 1);
     const [low, high] = this.header.box, side = low.map((x, i) => high[i] - x);
@@ -54,8 +65,7 @@ class Camera {
   }
 
   zoom(factor) {
-    const { distance } = this.header.camera;
-    this.distance = Math.min(Math.max(this.distance * factor, 1e-3 * distance), 1e3 * distance);
+    this.factor = Math.min(Math.max(this.factor * factor, 1e-3), 1e3);
   }
 
   // One pointer orbits, with Shift or another button it pans; two pan and zoom.

@@ -61,9 +61,11 @@ class Figure {
           images.set(one.image, pictureTexture(gl, this.arrays[one.image], one));
         return { unit: one.unit, texture: images.get(one.image) };
       }) }));
-    const name = mesh.hasMaterials ? "mesh-MATERIALS" : "mesh";
-    this.surface = this.programs.get(name);
+    const macros = mesh.hasMaterials ? "-MATERIALS" : "";
+    this.surface = this.programs.get(`mesh${macros}`);
     this.surfaceArray = vertexArray(gl, this.surface, this.attributes, this.indices);
+    this.depth = this.programs.get(`depth${macros}`);
+    this.depthArray = vertexArray(gl, this.depth, this.attributes, this.indices);
   }
 
   // Copies rows of vertices to the split vertices along texture seams.
@@ -175,6 +177,36 @@ class Figure {
       u_normal_matrix: normalMatrix(modelView), u_orthographic: false };
   }
 
+  // A sphere about the posed figure in scene space: its centre, and its radius.
+  get bounds() {
+    const [x, y, z] = this.center, model = product4(this.data.placement, this.model);
+    const at = [0, 1, 2].map((i) => model[i] * x + model[4 + i] * y + model[8 + i] * z + model[12 + i]);
+    return [at, 0.8 * this.data.size * Math.hypot(model[0], model[1], model[2])];
+  }
+
+  // Draws the depths of the surface for the shadow map; blended texels cover a part of it.
+  drawDepth(light) {
+    if (!this.isDrawn || !this.data.mesh) return;
+    const gl = this.gl;
+    gl.bindVertexArray(this.depthArray);
+    for (const [index, first, count] of this.data.mesh.runs) {
+      const surface = index < 0 ? null : this.surfaces[index];
+      setUniforms(gl, this.depth, { ...this.placing(light), u_color: this.data.color,
+        u_has_tint: "in_tint" in this.attributes, u_texture: 5, u_threshold: 0,
+        ...(surface ? surface.uniforms : { u_textured: false, u_alpha_mode: 0 }) });
+      this.bindTextures(surface);
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
+    }
+    gl.bindVertexArray(null);
+  }
+
+  bindTextures(surface) {
+    for (const { unit, texture } of surface ? surface.textures : []) {
+      this.gl.activeTexture(this.gl.TEXTURE0 + unit);
+      this.gl.bindTexture(this.gl.TEXTURE_2D, texture);
+    }
+  }
+
   get isDrawn() { return this.isVisible && this.tracks.isPresent; }
 
   // Draws the opaque or the blended surfaces.
@@ -194,10 +226,7 @@ class Figure {
         ...(surface ? surface.uniforms : { u_textured: false, u_has_base_factor: false,
           u_alpha_mode: 0, u_normal_scale: 0, u_toon: false }),
         ...(shows ? { u_textured: false, u_has_base_factor: false, u_normal_scale: 0 } : {}) });
-      for (const { unit, texture } of surface ? surface.textures : []) {
-        gl.activeTexture(gl.TEXTURE0 + unit);
-        gl.bindTexture(gl.TEXTURE_2D, texture);
-      }
+      this.bindTextures(surface);
       (surface && !surface.isDoubleSided ? gl.enable : gl.disable).call(gl, gl.CULL_FACE);
       gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
     }

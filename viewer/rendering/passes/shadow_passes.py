@@ -37,10 +37,10 @@ _BELOW = 0.05  # maximum depth to which feet sink into the ground, figure sizes
 _NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, figure sizes
 
 # On the ground.
-_SHADOW_OPACITY = 0.42  # opacity of the key light's shadow
+SHADOW_OPACITY = 0.42  # opacity of the key light's shadow
 _CONTACT_OPACITIES = 0.55, 0.38
 # Sine of the light's elevation at which its shadow appears and has full strength.
-_GRAZING = 0.06, 0.22
+GRAZING = 0.06, 0.22
 _FIELD_UNIT = 0
 
 
@@ -177,7 +177,7 @@ class GroundShadowPass:
         back = np.linalg.inv(shadow.matrix)
         away = back[:3, 2]
         slope = -(up @ away) / np.linalg.norm(away)
-        fade = float(np.clip((slope - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0.0, 1.0))
+        fade = float(np.clip((slope - GRAZING[0]) / (GRAZING[1] - GRAZING[0]), 0.0, 1.0))
         if fade == 0.0:
             return
         # Rays through the corners of the map meet the ground at these depths.
@@ -190,7 +190,7 @@ class GroundShadowPass:
             "u_shadow_map": SHADOW_UNIT,
             "u_shadow_filter": shadow.filter(is_ground=True),
             "u_depth": (float(depths[0]), *growth.tolist()),
-            "u_opacity": _SHADOW_OPACITY * fade * shadow.strength,
+            "u_opacity": SHADOW_OPACITY * fade * shadow.strength,
         }
         set_uniforms(program, values)
         shadow.texture.use(SHADOW_UNIT)
