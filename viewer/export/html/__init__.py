@@ -57,7 +57,7 @@ from viewer.rig.srgb import decode_srgb
 _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")
 _SEEN = 9  # frames that are framed, measured and shown as still pictures at most
-_POSTER = (960, 540)
+_POSTER = (800, 450)
 _ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fit
 
 
