@@ -57,6 +57,7 @@ _FOUND = ("search", "in place")  # origins of alignments that were not given by 
 
 _FACING = Remedy("Facing", "--facing")
 _CLEARLY = 0.85  # fraction of the misfit that an unusual facing must reach
+_STRAIGHTER = 0.75  # ratio of bends below which the straighter start is right
 _MOST_STARTS = 2  # starts from anatomy that are fitted to the surface
 _NEARBY = 0.08  # ratio of the search radius to the size at the beginning of such a fit
 _CLOSER = 0.03  # the same ratio for a fit to the surface only
@@ -177,6 +178,9 @@ def _best(job: _Job, ours: Posed, kept: PosedAlignment, starts: list[Start]) -> 
 def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[tuple[Start, PosedAlignment]]:
     """Fit the starts that face the usual way, and the best one also facing the other way."""
     usual = [start for start in starts if start.is_sure or start.is_usual] or starts
+    # To make arms of ears, trunk and legs must bend, too.
+    least = min((start.bend for start in usual), default=0.0)
+    usual = [start for start in usual if _STRAIGHTER * start.bend <= least]
     found = []
     for number, start in enumerate(usual[:_MOST_STARTS]):
         with part_of_work(span=(0.45 + 0.12 * number, 0.57 + 0.12 * number)):
