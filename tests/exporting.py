@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
-from viewer.export import ExportOptions, Part, Selection, export
+from viewer.exporters import ExportOptions, Part, Selection, export
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.animation_choice import own_animations

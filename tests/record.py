@@ -19,7 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from viewer.commands import COMMANDS
-from viewer.export import EXPORTERS
+from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -37,10 +37,10 @@ PARTS = {
     "media": {"rig", "interrupts", "streams"},
     "formats": {"media", "rig", "interrupts", "streams"},
     "rendering": {"rig", "interrupts", "resources"},
-    "export": {"autorig", "formats", "media", "rendering", "rig", "interrupts"},
+    "exporters": {"autorig", "formats", "media", "rendering", "rig", "interrupts"},
     "loading": {"formats", "models", "rig", "interrupts"},
     "app": {
-        *("autorig", "export", "formats", "lint", "loading", "manual", "media", "models"),
+        *("autorig", "exporters", "formats", "lint", "loading", "manual", "media", "models"),
         *("rendering", "rig", "interrupts", "resources"),
     },
     "lint": {"loading", "formats", "rig"},

@@ -12,7 +12,7 @@ from viewer.app.layout import PANELS, panel_module
 from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
 from viewer.examples import EXAMPLES
-from viewer.export import EXPORTERS
+from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.rendering.gpu.program import SHADING
 from viewer.resources import resource
@@ -34,11 +34,11 @@ def modules(folder: str) -> set[str]:
         ("formats", FORMATS),
         ("rig/skinning", METHODS),
         ("commands", COMMANDS),
-        ("export", EXPORTERS),
+        ("exporters", EXPORTERS),
         ("batching/engines", ENGINES),
         ("examples", EXAMPLES),
     ],
-    ids=["formats", "skinning", "commands", "export", "engines", "examples"],
+    ids=["formats", "skinning", "commands", "exporters", "engines", "examples"],
 )
 def test_registry_matches_its_folder(folder, registry):
     assert modules(folder) == set(registry)
@@ -60,7 +60,7 @@ def test_formats_can_read_and_write_as_declared():
 
 def test_exporters_write_what_they_declare():
     for name, kind in EXPORTERS.items():
-        module = import_module(f"viewer.export.{name}")
+        module = import_module(f"viewer.exporters.{name}")
         assert callable(module.export) and kind.stores
         assert hasattr(module, "require") == bool(kind.joints)
 

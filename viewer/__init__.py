@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from viewer.app.window import show
     from viewer.batching.report import Report
     from viewer.commands._batch.calling import batch
+    from viewer.commands._exports import export
     from viewer.commands._pictures import render, video
     from viewer.errors import ViewerError
-    from viewer.export import export
     from viewer.formats import write
     from viewer.loading import load
     from viewer.loading.own_arrays import animate, figure
@@ -129,7 +129,7 @@ _HOMES = {
     "deform": "rig.skinning",
     "deform_frames": "rig.skinning",
     "evaluate": "rig.motion.clip",
-    "export": "export",
+    "export": "commands._exports",
     "figure": "loading.own_arrays",
     "joint_matrices": "rig.skinning",
     "joints": "rig.motion.actor_arrays",

@@ -38,7 +38,7 @@ CONVERT = "cli.run(['convert', sys.argv[1], '-o', sys.argv[2]])"
 # The peak returned by getrusage includes that of the parent process at the fork.
 CHILD = """
 import sys
-import viewer.export.bvh, viewer.formats.bvh, viewer.loading
+import viewer.exporters.bvh, viewer.formats.bvh, viewer.loading
 from viewer import cli
 from viewer.formats import Source, read
 from viewer.media.array_cache import without_cache

@@ -9,7 +9,7 @@ from exporting import export_frames
 from measure import interleaved, report
 
 import viewer
-from viewer.export import ExportOptions
+from viewer.exporters import ExportOptions
 from viewer.loading import bundled_body
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
@@ -46,7 +46,7 @@ def main(rounds: int = 7) -> None:
                 export_frames(animation, path, key, ExportOptions())
 
             def alone(key: str = key, path: Path = path, lost: str = lost) -> None:
-                with patch(f"viewer.export.{key}.{lost}", lambda *_: []):
+                with patch(f"viewer.exporters.{key}.{lost}", lambda *_: []):
                     export_frames(animation, path, key, ExportOptions())
 
             times = interleaved({"compared": export, "not compared": alone}, rounds)

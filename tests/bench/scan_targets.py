@@ -15,7 +15,7 @@ import transfer_targets as made
 from exporting import export_frames
 
 import viewer
-from viewer.export import ExportOptions, export
+from viewer.exporters import ExportOptions, export
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.motion.sampled_animation import sample_animation

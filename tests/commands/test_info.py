@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 from app.tiny import write_rig
-from export.plain_smpl import smpl_forward
-from export.small_rigs import pose_190, write_box, write_twist
+from exporters.plain_smpl import smpl_forward
+from exporters.small_rigs import pose_190, write_box, write_twist
 from formats.capture_files import body, standing, write_frames
 from formats.gltf.files import File, skinned
 from formats.synthetic_smpl import model

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from export.plain_readers import read_obj
+from exporters.plain_readers import read_obj
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from export.small_rigs import ARMS_SKEL, LOPSIDED_SKEL, clip_text, write_box, write_twist
+from exporters.small_rigs import ARMS_SKEL, LOPSIDED_SKEL, clip_text, write_box, write_twist
 from formats.synthetic_smpl import model
 
 from viewer.cli import run

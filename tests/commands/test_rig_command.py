@@ -10,7 +10,7 @@ from viewer.cli import run
 from viewer.commands import rig
 from viewer.commands.rig import read_landmarks
 from viewer.errors import FormatError
-from viewer.export import export
+from viewer.exporters import export
 from viewer.formats import Source
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure

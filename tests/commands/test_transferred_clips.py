@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.export import export
+from viewer.exporters import export
 from viewer.formats import write
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from export.seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
-from export.small_rigs import clip_text, write_twist
+from exporters.seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
+from exporters.small_rigs import clip_text, write_twist
 from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model
 
 from viewer.cli import run
-from viewer.export import export
+from viewer.exporters import export
 from viewer.media import saving
 
 REMARKS = ("warning: ", "note: ")

@@ -11,7 +11,7 @@ from rig.retargeting.standing_motions import jump, kneel, treadmill
 from rig.retargeting.test_standing_feet import jerky_walk
 from rig.retargeting.walking import RATE, walk
 
-from viewer.export import ExportOptions
+from viewer.exporters import ExportOptions
 from viewer.lint import lint_scene
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.loading.cleaning import clean_up

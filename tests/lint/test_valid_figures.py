@@ -5,7 +5,7 @@ from app.tiny import write_rig
 
 import viewer
 from viewer.cli import run
-from viewer.export import export
+from viewer.exporters import export
 from viewer.lint import Finding, lint_files
 from viewer.loading import bundled_body, bundled_files
 from viewer.rig.figure import Figure

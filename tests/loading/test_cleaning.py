@@ -18,8 +18,8 @@ from rig.retargeting.walking import RATE, walk
 
 from viewer.cli import run
 from viewer.errors import RigError
-from viewer.export import ExportOptions
-from viewer.export.rig import scaled
+from viewer.exporters import ExportOptions
+from viewer.exporters.rig import scaled
 from viewer.formats.rigged import save
 from viewer.loading import Contents, MotionSettings, begin, bundled_body, load
 from viewer.loading.cleaning import clean_up

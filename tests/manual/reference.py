@@ -14,7 +14,7 @@ from viewer.app.features import KEYS, MOUSE
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
 from viewer.diagnostics import CODES
-from viewer.export import EXPORTERS
+from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.media.video_kinds import VIDEOS
 from viewer.rendering.gpu.program import SHADING

@@ -13,7 +13,7 @@ from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
 from viewer.diagnostics import CODES
 from viewer.errors import ViewerError
-from viewer.export import EXPORTERS
+from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.manual import PAGES, page_text
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import family_figure
-from export.plain_smpl import smpl_forward
+from exporters.plain_smpl import smpl_forward
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z

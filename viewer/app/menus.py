@@ -48,7 +48,7 @@ from viewer.app.posing.posing import (
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
 from viewer.app.view.display_panel import draw_view_menu
-from viewer.export import files_written
+from viewer.exporters import files_written
 from viewer.formats import file_stem, opened_text
 from viewer.phrases import printable
 

@@ -91,7 +91,7 @@ def render(
     >>> viewer.render(viewer.load(), size=(64, 48)).shape
     (48, 64, 4)
     """
-    scene, shown = _scene_of(scene, "render"), _display(options, background, quality, scalar)
+    scene, shown = scene_of(scene, "render"), _display(options, background, quality, scalar)
     if time is not None:
         scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
         pose_actors(scene.actors, time)
@@ -104,7 +104,7 @@ def render(
     )
     if view != ViewOptions() and camera is not None:
         raise ViewerError("camera: expected it or settings of the view, found both")
-    with _without_dashes():
+    with without_dashes():
         _check_scalar(scene, shown)
         if camera is None and view != ViewOptions():
             points = with_cameras(scene, shown, scene_points(scene, shown.show))
@@ -168,7 +168,7 @@ def video(
     # The command's other needs are not those of ``render``.
     from viewer.commands.render import Drawing, complete, draw_sequence
 
-    scene, shown = _scene_of(scene, "video"), _display(options, background, quality, scalar)
+    scene, shown = scene_of(scene, "video"), _display(options, background, quality, scalar)
     view = ViewOptions(
         look_at=look_at,
         follow=follow,
@@ -182,7 +182,7 @@ def video(
         asked.frames.frames = f"{frames.start}:{frames.stop}:{frames.step}"
     asked.frames.fps = fps
     request = Request(Path(path), speed=speed)
-    with _without_dashes():
+    with without_dashes():
         if turntable is not False:
             request.turntable = parse_turntable("" if turntable is True else str(turntable))
         complete(request, asked.frames, view, panels=False, has_quality=False)
@@ -204,7 +204,8 @@ def video(
         )
 
 
-def _scene_of(what: Scene | Actor, name: str) -> Scene:
+def scene_of(what: Scene | Actor, name: str) -> Scene:
+    """Return a scene of what a function was given; ``name``: of the function, for errors."""
     scene = Scene([what]) if isinstance(what, Actor) else what
     if not isinstance(scene, Scene):
         raise ViewerError(f"{name}: expected a scene or an actor, found {type(scene).__name__}")
@@ -233,7 +234,7 @@ def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
 
 
 @contextmanager
-def _without_dashes() -> Iterator[None]:
+def without_dashes() -> Iterator[None]:
     """Name settings in errors as in Python: messages of the command name its options."""
     try:
         yield

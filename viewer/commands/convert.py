@@ -39,7 +39,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, OutputError, RigError, UnsupportedFormatError, ViewerError
-from viewer.export import (
+from viewer.exporters import (
     EXPORTERS,
     FOLDER,
     ExportOptions,
@@ -55,7 +55,7 @@ from viewer.export import (
     sampled,
     suited_exporter,
 )
-from viewer.export._motion_paths import PERSON, is_together, motion_paths
+from viewer.exporters._motion_paths import PERSON, is_together, motion_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
 from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
@@ -148,7 +148,7 @@ def run(arguments: argparse.Namespace) -> int:
         baked = _bake_springs(asked.motion.springs, asked.frames.fps, scene, output)
         saving = _saving_joint_map(joint_map, asked, scene, output, arguments.force)
         with saving, shown_progress("converting"):
-            selection, options, chosen = _selected(asked, options, scene, output)
+            selection, options, chosen = selected(asked, options, scene, output)
             files, inputs = output_files(selection, output, options), inputs_of(asked, scene)
             if output.suffix:
                 check_targets(files, inputs, arguments.force)
@@ -357,7 +357,7 @@ def _keeps_keys(key: str, frames: Frames, output: Path, scene: Scene) -> bool:
     return bool(moving) and all(keeps_keys(scene, actor) for actor in moving)
 
 
-def _selected(
+def selected(
     asked: SceneOptions, options: ExportOptions, scene: Scene, output: Path
 ) -> tuple[Selection, ExportOptions, list[Diagnostic]]:
     """Return what is written of a scene, how, and notes about what was chosen."""

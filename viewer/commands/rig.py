@@ -38,7 +38,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
-from viewer.export import (
+from viewer.exporters import (
     ExportOptions,
     Selection,
     VrmMeta,
@@ -153,7 +153,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, print a report, write it, and show it if requested."""
-    from viewer.export._rigged_files import files_of, write_rigged
+    from viewer.exporters._rigged_files import files_of, write_rigged
 
     output = None if arguments.output is None else Path(arguments.output)
     meta = settings_of(VrmMeta, arguments)
@@ -170,7 +170,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets(files_of(output), inputs, arguments.force)
     target = _target(arguments.files, inputs)
     if output is not None and output.suffix.lower() == ".vrm":
-        from viewer.export.vrm import checked_meta
+        from viewer.exporters.vrm import checked_meta
 
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     if arguments.template_frame is not None:

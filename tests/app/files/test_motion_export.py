@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app.captured import dots, people, walk
-from export.gltf.two_parts import two_parts
+from exporters.gltf.two_parts import two_parts
 
 import viewer
 from viewer.app.files import motion_export
@@ -24,7 +24,7 @@ from viewer.app.files.motion_export import (
 )
 from viewer.app.files.saving import save_in_background
 from viewer.app.posing.posing import save_export
-from viewer.export import obj
+from viewer.exporters import obj
 from viewer.formats import save_bytes
 from viewer.media.saving import save_text
 from viewer.progress import report

@@ -21,7 +21,7 @@ from viewer.app.rigging.placing import placing_now
 from viewer.app.rigging.rigging import Rigging, target_mesh, targets, template_texts, templates
 from viewer.app.rigging.work import align_template, start_adding, start_reading
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.export import export
+from viewer.exporters import export
 from viewer.formats.rigged import save
 from viewer.progress import report_fraction
 from viewer.rig.geometry.transform import apply_transform

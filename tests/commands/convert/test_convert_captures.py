@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 from builders import rotation
-from export.plain_bvh import PlainBvh
-from export.plain_readers import read_obj
-from export.small_rigs import ARMS_SKEL, clip_text, write_box, write_twist
+from exporters.plain_bvh import PlainBvh
+from exporters.plain_readers import read_obj
+from exporters.small_rigs import ARMS_SKEL, clip_text, write_box, write_twist
 from formats.capture_files import body, points, standing, write_frames
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from export.plain_readers import columns, read_obj, read_ply
-from export.plain_smpl import smpl_forward
-from export.small_rigs import ARMS_SKEL, clip_text, pose_190, write_box, write_twist
+from exporters.plain_readers import columns, read_obj, read_ply
+from exporters.plain_smpl import smpl_forward
+from exporters.small_rigs import ARMS_SKEL, clip_text, pose_190, write_box, write_twist
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.cli import run
 from viewer.errors import OutputError
-from viewer.export import EXPORTERS, obj
+from viewer.exporters import EXPORTERS, obj
 from viewer.formats import save_parts
 
 DIGITS = 5e-9  # half of the ninth digit of numbers below 10

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from app.tiny import write_rig
-from export.gltf.two_parts import two_parts
-from export.plain_gltf import Gltf
+from exporters.gltf.two_parts import two_parts
+from exporters.plain_gltf import Gltf
 from exporting import export_clips
 from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model

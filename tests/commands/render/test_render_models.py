@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from app.tiny import write_rig
-from export.small_rigs import pose_190, write_box
+from exporters.small_rigs import pose_190, write_box
 from formats.synthetic_smpl import model
 from PIL import Image
 

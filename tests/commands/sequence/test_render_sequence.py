@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from app.tiny import write_rig
 from commands.drawn_motions import anim_text, frames, names, picture
-from export.small_rigs import clip_text, write_twist
+from exporters.small_rigs import clip_text, write_twist
 from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from viewer.export import export
+from viewer.exporters import export
 from viewer.formats import Source, obj, ply, write
 from viewer.formats._text.number_text import row_texts
 from viewer.media.saving import save_parts

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from builders import rotation
-from export.plain_smpl import smpl_forward
+from exporters.plain_smpl import smpl_forward
 from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
 from formats.synthetic_smpl import joint_parents, model

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from builders import rotation
-from export.plain_smpl import smpl_forward
+from exporters.plain_smpl import smpl_forward
 from faults import told
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose

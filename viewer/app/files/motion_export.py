@@ -24,7 +24,7 @@ from viewer.app.files.files import ask_where_to_write
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import RigError
-from viewer.export import (
+from viewer.exporters import (
     EXPORTERS,
     FOLDER,
     Exporter,
@@ -36,9 +36,9 @@ from viewer.export import (
     sampled,
     suited_exporter,
 )
-from viewer.export._motion_paths import files_at, is_together, motion_paths, part_paths
-from viewer.export._options import SAFE_NAMES
-from viewer.export.vrm.humanoid import is_humanoid
+from viewer.exporters._motion_paths import files_at, is_together, motion_paths, part_paths
+from viewer.exporters._options import SAFE_NAMES
+from viewer.exporters.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.progress import part_of_work, report

@@ -18,8 +18,8 @@ from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
-from viewer.export import ExportOptions, Part, Selection, export, files_written
-from viewer.export.pose import export as export_pose
+from viewer.exporters import ExportOptions, Part, Selection, export, files_written
+from viewer.exporters.pose import export as export_pose
 from viewer.formats import FORMATS, Source, file_stem
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

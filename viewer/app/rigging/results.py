@@ -28,7 +28,7 @@ from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Comparison, Result, Rigging, no_results
 from viewer.autorig.rigged import clip_for
-from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
+from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.annotations import VertexField

@@ -1,0 +1,83 @@
+"""Numbers of a page: rounding, differences, and fields of displacements."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.exporters.html.offsets import principal_fields
+from viewer.exporters.html.packing import Packer, unpacked
+
+
+def read_back(packer):
+    return unpacked(packer.items, packer.text())
+
+
+def test_arrays_are_rounded_to_steps():
+    random = np.random.default_rng(3)
+    first, second = random.normal(size=(50, 3)), random.normal(size=(7, 2)) * [1e-3, 1e4]
+    packer = Packer()
+    assert packer.add(first, 1e-3) == 0
+    assert packer.add_file(b"\x89PNG", "image/png") == 1
+    assert packer.add(second, [1e-6, 1.0]) == 2
+    rounded, none, scaled = read_back(packer)
+    assert_allclose(rounded, first, rtol=0, atol=0.5001e-3)
+    assert none.size == 0
+    assert (np.abs(scaled - second).max(axis=0) <= [0.5001e-6, 0.5001]).all()
+
+
+@pytest.mark.parametrize("values", [[], [0], [-1], [2**29, -(2**29), 0], [5] * 9, range(-4, 300)])
+def test_integers_are_exact(values):
+    packer = Packer()
+    packer.add(values)
+    assert_array_equal(read_back(packer)[0].reshape(-1), np.array([*values], dtype=float))
+
+
+def test_smooth_tracks_need_few_bytes():
+    """The second differences of a parabola are constant: 1000 rows take hardly any space."""
+    packer = Packer()
+    packer.add(np.arange(1000.0)[:, None] ** 2 * [1.0, -3.0])
+    assert packer.items[0]["order"] == 2 and len(packer.text()) < 100
+
+
+def test_numbers_far_from_the_origin_keep_their_step():
+    packer = Packer()
+    values = 1e9 + np.array([[0.0], [0.25], [3.5]])
+    packer.add(values, 0.25)
+    assert_array_equal(read_back(packer)[0], values)
+
+
+def test_steps_grow_where_integers_would_not_suffice():
+    packer = Packer()
+    packer.add([[0.0], [1e12]], 1e-3)
+    assert_allclose(read_back(packer)[0], [[0.0], [1e12]], atol=1e12 / 2**30)
+
+
+def test_fields_reproduce_a_motion_of_three_directions():
+    """The weights of 40 shapes move along 3 directions only, so 3 fields suffice."""
+    random = np.random.default_rng(5)
+    shapes = random.normal(size=(40, 30, 3))
+    weights = random.normal(size=(25, 3)) @ random.normal(size=(3, 40)) + random.normal(size=40)
+    found = principal_fields(weights, lambda row: np.einsum("s,sva->va", row, shapes), 1e-9)
+    assert len(found.fields) == 3 and np.abs(found.weights).max() <= 1.0 + 1e-12
+    wanted = np.einsum("fs,sva->fva", weights, shapes)
+    again = found.mean + np.einsum("fk,kva->fva", found.weights, found.fields)
+    assert_allclose(again, wanted, atol=2e-9)
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-6])
+def test_fields_keep_their_tolerance(tolerance):
+    random = np.random.default_rng(6)
+    shapes = random.normal(size=(12, 50, 3)) * 0.5 ** np.arange(12)[:, None, None]
+    weights = random.normal(size=(60, 12))
+    found = principal_fields(weights, lambda row: np.einsum("s,sva->va", row, shapes), tolerance)
+    wanted = np.einsum("fs,sva->fva", weights, shapes)
+    again = found.mean + np.einsum("fk,kva->fva", found.weights, found.fields)
+    assert np.linalg.norm(again - wanted, axis=-1).max() <= 1.000001 * tolerance
+
+
+def test_a_still_pose_needs_no_field():
+    shapes = np.random.default_rng(7).normal(size=(4, 10, 3))
+    weights = np.array([[0.5, -1.0, 0.0, 2.0]])
+    found = principal_fields(weights, lambda row: np.einsum("s,sva->va", row, shapes), 1e-9)
+    assert len(found.fields) == 0
+    assert_allclose(found.mean, np.einsum("s,sva->va", weights[0], shapes), atol=1e-12)

@@ -1,0 +1,278 @@
+"""Pages opened in Chromium: positions of the shaders, controls, and nothing from a network."""
+
+import io
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from browser import Browser, needs_chromium
+from builders import family_figure, quaternions
+from numpy.testing import assert_allclose
+from PIL import Image
+
+import viewer
+from viewer.cli import run
+from viewer.errors import RigError
+from viewer.exporters import ExportOptions, Part, Selection, export
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion.evaluation import pose_of
+from viewer.rig.motion.sampled_animation import sample_animation
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin
+from viewer.rig.skinning import Skinning, deform
+
+HOSTILE = "</script><script>document.title='broken'</script>"
+EXACT = 1e-5  # of the figure's size, the accuracy that pages promise
+
+
+def tangle(n_joints=17, n_vertices=90, n_influences=13, far=0.0, seed=1, **parts):
+    """A chain of joints with random triangles, each vertex with many influences."""
+    random = np.random.default_rng(seed)
+    offsets = random.normal(size=(n_joints, 3)) * 0.3 + [0.0, 0.2, 0.0]
+    offsets[0] = far
+    joints = np.cumsum(offsets, axis=0)
+    none = np.zeros(0, dtype=np.int32)
+    skeleton = Skeleton(
+        names=(HOSTILE, *(f"joint {number}" for number in range(1, n_joints))),
+        parents=np.arange(-1, n_joints - 1, dtype=np.int32),
+        rest_translations=offsets,
+        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (n_joints, 1)),
+        rest_scales=np.ones((n_joints, 3)),
+        dof_joints=none,
+        dof_kinds=none,
+        rest_dofs=np.zeros(0),
+        dof_limits=np.zeros((0, 2)),
+    )
+    inverse = np.tile(np.eye(4), (n_joints, 1, 1))
+    inverse[:, :3, 3] = -joints
+    weights = random.dirichlet(np.ones(n_influences), size=n_vertices)
+    chosen = [random.permutation(n_joints)[:n_influences] for _ in range(n_vertices)]
+    skin = Skin(
+        starts=np.arange(n_vertices + 1, dtype=np.int32) * n_influences,
+        joints=np.concatenate(chosen).astype(np.int32),
+        weights=weights.reshape(-1),
+        inverse_bind=inverse,
+    )
+    positions = joints[random.integers(n_joints, size=n_vertices)]
+    positions = positions + random.normal(size=(n_vertices, 3)) * 0.2
+    triangles = random.permutation(n_vertices).reshape(-1, 3)
+    normals = random.normal(size=(n_vertices, 3))
+    mesh = viewer.Mesh(positions, normals, triangles.astype(np.int32))
+    return viewer.Figure(HOSTILE, mesh=mesh, skeleton=skeleton, skin=skin, **parts)
+
+
+def moving(figure, n_frames=5, rate=10.0, scales=None, shapes=None, missing=(), seed=2):
+    """An actor whose joints rotate at random, and whose root moves."""
+    random = np.random.default_rng(seed)
+    n_joints = figure.skeleton.n_joints
+    translations = np.zeros((n_frames, n_joints, 3))
+    translations[:, 0] = random.normal(size=(n_frames, 3))
+    rows = [-1 if frame in missing else frame for frame in range(n_frames)]
+    clip = SampledClip(
+        "dance",
+        Timing(rate, np.array(rows, dtype=np.int32)),
+        quaternions(random.normal(size=(n_frames, n_joints, 3))),
+        translations,
+        random.normal(size=(n_frames, 3)),
+        random.uniform(0.5, 2.0, size=n_frames),
+        shape_weights=None if shapes is None else shapes,
+        scales=None if scales is None else scales,
+    )
+    return Actor(figure, figure_pose(figure), clip)
+
+
+def write(path, *actors, how=None):
+    """Write the motions of some actors; return each animation and the notes."""
+    animations = [sample_animation(each) for each in actors]
+    parts = [Part(actor, None, each) for actor, each in zip(actors, animations, strict=True)]
+    scene = Scene([*actors]) if len(actors) > 1 else None
+    notes = export(Selection(parts, scene), path, skinning=how)
+    return animations, [str(each) for each in notes]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with Browser() as found:
+        yield found
+
+
+def positions_at(browser, time, index=0):
+    browser.run(f"viewer.seek({time}).then(() => null)")
+    return np.array(browser.run(f"viewer.positions({index})"))
+
+
+def check_frames(browser, animation, how, frames, index=0):
+    """Compare the vertices of the shader with the float64 reference."""
+    figure = animation.figure
+    for frame in frames:
+        wanted = deform(figure, pose_of(figure, animation.frames, frame), how)[0]
+        found = positions_at(browser, frame / animation.frame_rate, index)
+        scale = animation.frames.figure_scales[frame]
+        size = box_size(bounding_box(figure.mesh.positions)) * max(scale, 1.0)
+        assert np.linalg.norm(found - wanted, axis=1).max() <= EXACT * size, frame
+
+
+def scales_of(figure, n_frames=5):
+    random = np.random.default_rng(8)
+    return random.uniform(0.6, 1.5, size=(n_frames, figure.skeleton.n_joints, 3))
+
+
+@needs_chromium
+@pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
+@pytest.mark.parametrize("scaled", [False, True])
+def test_thirteen_influences_are_exact(browser, tmp_path, method, scaled):
+    figure = tangle(far=40.0)
+    scales = scales_of(figure) if scaled else None
+    how = Skinning(method, 0.3)
+    (animation,), _ = write(tmp_path / "a.html", moving(figure, scales=scales), how=how)
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, how, [0, 2, 4])
+    assert browser.messages == [] and browser.run("document.title") == "a"
+    assert all(each.startswith(("file:", "data:")) for each in browser.requests)
+
+
+@needs_chromium
+def test_shapes_and_correctives_move_the_rest_vertices(browser, tmp_path):
+    plain = tangle(n_joints=4, n_influences=2)
+    random = np.random.default_rng(9)
+    shapes = BlendShapes(("a", "b", "c"), random.normal(size=(3, 90, 3)) * 0.1)
+    correctives = viewer.rig.blendshapes.Correctives(random.normal(size=(27, 90, 3)) * 0.05)
+    figure = replace(plain, blend_shapes=shapes, correctives=correctives)
+    weights = random.normal(size=(5, 3))
+    (animation,), _ = write(tmp_path / "a.html", moving(figure, shapes=weights))
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, Skinning(), [0, 1, 4])
+
+
+@needs_chromium
+@pytest.mark.parametrize("changes", [False, True])
+def test_smpl_body_in_motion_with_its_shape(browser, tmp_path, changes):
+    """Shapes move the joints, too; in the second motion they change from frame to frame."""
+    figure = family_figure("smpl", tmp_path)
+    random = np.random.default_rng(4)
+    shapes = random.normal(size=(5 if changes else 1, figure.n_shapes)) * 2.0
+    actor = moving(figure, shapes=np.broadcast_to(shapes, (5, figure.n_shapes)))
+    (animation,), _ = write(tmp_path / "a.html", actor)
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, Skinning(), [0, 3])
+
+
+@needs_chromium
+def test_weights_that_do_not_sum_to_one_are_exact(browser, tmp_path):
+    plain = tangle(far=3.0)
+    uneven = np.random.default_rng(3).uniform(0.8, 1.3, size=90).repeat(13)
+    figure = replace(plain, skin=replace(plain.skin, weights=plain.skin.weights * uneven))
+    (animation,), _ = write(tmp_path / "a.html", moving(figure))
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, Skinning(), [1, 4])
+
+
+@needs_chromium
+def test_people_come_and_go(browser, tmp_path):
+    first = moving(tangle(n_joints=5, n_influences=3))
+    second = moving(tangle(n_joints=6, n_influences=2, seed=4), missing=(1, 2), seed=5)
+    second.placement[:3, 3] = 2.0, 0.0, 1.0
+    (_, animation), _ = write(tmp_path / "a.html", first, second)
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, Skinning(), [0, 3, 4], index=1)
+    drawn = "viewer.ready.then(page => page.figures.map(each => each.isDrawn))"
+    seen = []
+    for frame in range(5):
+        positions_at(browser, frame / 10)
+        seen.append(browser.run(drawn))
+    assert seen == [[True, there] for there in (True, False, False, True, True)]
+    assert browser.run("[...document.getElementById('figure').options].length") == 2
+    assert browser.messages == []
+
+
+@needs_chromium
+def test_controls_play_orbit_and_show_weights(browser, tmp_path):
+    write(tmp_path / "a.html", moving(tangle(n_joints=4, n_influences=2)))
+    browser.open(tmp_path / "a.html")
+    camera = "viewer.ready.then(page => [page.camera.azimuth, page.camera.distance])"
+    azimuth, distance = browser.run(camera)
+    browser.mouse("Pressed", 200, 120, button="left", buttons=1)
+    browser.mouse("Moved", 250, 120, button="left", buttons=1)
+    browser.mouse("Released", 250, 120, button="left")
+    browser.mouse("Wheel", 200, 120, deltaX=0, deltaY=-100)
+    browser.settle()
+    turned, nearer = browser.run(camera)
+    assert turned == pytest.approx(azimuth - 20.0) and nearer < 0.9 * distance
+    touches = [{"x": 150, "y": 120, "id": 0}, {"x": 200, "y": 120, "id": 1}]
+    browser.send("Input.dispatchTouchEvent", type="touchStart", touchPoints=touches)
+    touches[1]["x"] = 300
+    browser.send("Input.dispatchTouchEvent", type="touchMove", touchPoints=touches)
+    browser.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    browser.settle()
+    assert browser.run(camera)[1] < 0.5 * nearer
+    for key in ("End", "s", "w"):
+        browser.send("Input.dispatchKeyEvent", type="keyDown", key=key, text=key[:1])
+    browser.settle()
+    assert browser.run("viewer.ready.then(page => page.time)") == pytest.approx(0.4)
+    browser.run("document.getElementById('loop').checked = false; viewer.play()")
+    browser.run("new Promise(done => setTimeout(done, 700))")
+    state = "viewer.ready.then(page => [page.time, page.isPlaying])"
+    assert browser.run(state) == [pytest.approx(0.4), False]
+    names = "[...document.getElementById('joint').options].map(each => each.text)"
+    assert browser.run(names)[:3] == ["no joint", HOSTILE, "joint 1"]
+    before = browser.screenshot()
+    browser.run(
+        "const list = document.getElementById('joint'); list.value = 1; "
+        "list.dispatchEvent(new Event('change'))"
+    )
+    browser.settle()
+    assert browser.screenshot() != before
+    assert browser.messages == []
+
+
+@needs_chromium
+def test_picture_matches_the_desktop(browser, tmp_path):
+    """The same fox from the same camera: only edges and the contact shadow differ."""
+    assert run(["convert", "-o", str(tmp_path / "fox.html")]) == 0
+    browser.open(tmp_path / "fox.html")
+    browser.run("document.getElementById('display').hidden = true")
+    browser.settle()
+    found = np.asarray(Image.open(io.BytesIO(browser.screenshot())).convert("RGB"), dtype=float)
+    height, width = found.shape[:2]
+    size = f"{width}x{height}"
+    picture = tmp_path / "fox.png"
+    assert run(["render", "-o", str(picture), "--size", size, "--quality", "normal"]) == 0
+    own = np.asarray(Image.open(picture).convert("RGB"), dtype=float)
+    apart = np.abs(found - own).max(axis=-1)
+    assert np.median(apart) <= 2.0 and (apart > 24.0).mean() < 0.02
+
+
+def test_page_permits_only_its_own_scripts_and_escapes_names(tmp_path):
+    write(tmp_path / "<b>&.html", moving(tangle(n_joints=4, n_influences=2)))
+    text = (tmp_path / "<b>&.html").read_text("utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
+    assert policy.startswith("default-src 'none'; img-src data:; script-src 'sha256-")
+    assert "unsafe" not in policy and "http" not in policy
+    assert "<title>&lt;b&gt;&amp;</title>" in text
+    assert HOSTILE not in text and text.count("</script>") == 3
+    header = json.loads(re.search(r'id="header">(.*?)</script>', text, re.DOTALL)[1])
+    assert header["figures"][0]["name"] == HOSTILE
+    assert not re.search(r"https?://", re.sub(r'id="data">.*?<', "", text))
+
+
+def test_notes_state_errors_of_the_written_numbers(tmp_path):
+    (animation,), notes = write(tmp_path / "a.html", moving(tangle()))
+    assert animation.frames.n_frames == 5
+    assert any("5 frames, 0.4 s" in each for each in notes)
+    assert_allclose([each.count("vertices differ") for each in notes[1:2]], [1])
+    percent = float(re.search(r"up to ([\d.]+) %", " ".join(notes))[1])
+    assert 0.0 < percent <= 100.0 * EXACT
+
+
+def test_units_and_axes_of_pages_are_those_of_the_scene(tmp_path):
+    actor = moving(tangle(n_joints=4, n_influences=2))
+    part = Part(actor, None, sample_animation(actor))
+    with pytest.raises(RigError, match="unit of pages: expected none"):
+        export(Selection([part]), tmp_path / "a.html", options=ExportOptions(unit="cm"))
+    assert not [*tmp_path.iterdir()]

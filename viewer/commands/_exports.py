@@ -1,0 +1,96 @@
+"""``viewer.export``: files of a scene or an actor, with the choices of the command ``convert``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from viewer.commands._scene import SceneOptions
+from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import Skinning
+
+if TYPE_CHECKING:
+    from viewer.exporters import ExportOptions, VrmMeta
+
+
+def export(
+    scene: Scene | Actor,
+    path: str | Path,
+    skinning: Skinning | None = None,
+    *,
+    frames: range | None = None,
+    fps: float | None = None,
+    time: float | None = None,
+    optimizes: bool = False,
+    meta: VrmMeta | None = None,
+    options: ExportOptions | None = None,
+) -> list[Diagnostic]:
+    """Write a scene or one actor as ``viewer convert`` does; existing files are replaced.
+
+    Motions are written where the format stores them, with their own keys if it can; else the
+    current poses.
+
+    Parameters
+    ----------
+    scene : Scene or Actor
+        What is written; of a single actor, its placement in the scene is omitted.
+    path : str or Path
+        The suffix selects the format. ``{person}`` in the name selects a file for each actor,
+        ``{frame:05}`` one for each frame.
+    skinning : Skinning, optional
+        Skinning method and options.
+    frames : range, optional
+        Numbers of the frames, without a step; the whole motion if omitted.
+    fps : float, optional
+        Frames per second; those of the motion if omitted.
+    time : float, optional
+        Seconds of the motions: writes the poses at that time.
+    optimizes : bool
+        Quantise vertices, which glTF and VRM support.
+    meta : VrmMeta, optional
+        Name, authors and licence of a VRM character; those of its file if omitted.
+    options : ExportOptions, optional
+        All options, including those above.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot store, with errors. ``str``
+        gives the text of each.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If no exporter writes this suffix, or it cannot quantise.
+    RigError
+        If the figure lacks the data that the format needs, or nobody is present.
+    ViewerError
+        If there are no such frames.
+    OutputError
+        If a file cannot be written.
+    """
+    from dataclasses import replace
+
+    from viewer.commands._pictures import scene_of, without_dashes
+    from viewer.commands.convert import selected
+    from viewer.exporters import ExportOptions, export
+    from viewer.rig.motion.evaluation import pose_actors
+
+    chosen = replace(options) if options is not None else ExportOptions()
+    chosen.skinning = chosen.skinning if skinning is None else skinning
+    chosen.meta, chosen.optimizes = meta or chosen.meta, optimizes or chosen.optimizes
+    asked, scene = SceneOptions([]), scene_of(scene, "export")
+    asked.frames.fps, asked.frames.time = fps, time
+    if frames is not None:
+        if frames.step != 1:
+            raise ViewerError(f"frames: expected a step of 1, found {frames.step}")
+        asked.frames.frames = f"{frames.start}:{frames.stop}"
+    with without_dashes():
+        asked.frames.check_range()
+        if time is not None:
+            scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
+            pose_actors(scene.actors, time)
+        selection, chosen, notes = selected(asked, chosen, scene, Path(path))
+        return [*export(selection, path, options=chosen), *notes]
