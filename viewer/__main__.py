@@ -51,10 +51,6 @@ def _run(received: list[int]) -> int:
     from viewer.interrupts import watch_program
 
     watch_program(received)
-    if sys.argv[1:2] == ["render"] and not any(one.startswith("--gpu") for one in sys.argv):
-        from viewer.rendering.gpu.egl_devices import load_driver
-
-        load_driver()
     from viewer.cli import run
 
     return run(sys.argv[1:])

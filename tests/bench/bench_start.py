@@ -3,8 +3,7 @@
 Times are processor times of the processes, which hardly depend on other programs and include
 software drivers. A first round fills the cache of parsed numbers.
 
-Elapsed times are printed too: ``viewer render`` loads the driver in a second thread, which a
-processor time does not show. They mean something only on a machine that does nothing else.
+Elapsed times are printed too; they mean something only on a machine that does nothing else.
 
 Idle threads of OpenBLAS busy-wait after numpy is imported; ``viewer`` shortens that time, the
 minimal programs do not. So each of them is also measured with the same setting, which shows the

@@ -28,7 +28,6 @@ from viewer.rendering.gpu.egl_devices import (
     EglDevice,
     device_of_worker,
     egl_devices,
-    load_driver,
 )
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
@@ -361,32 +360,6 @@ def test_workers_draw_on_the_visible_card_or_take_cards_in_turn(devices, visible
 def test_listed_devices_are_those_used_by_contexts():
     devices = egl_devices()
     assert [one.index for one in devices] == [*range(device_count())]
-
-
-@LINUX
-def test_driver_that_was_loaded_in_a_thread_draws():
-    # In a new process, whose driver nothing else has loaded.
-    program = (
-        "from viewer.rendering.gpu.egl_devices import load_driver\n"
-        "thread = load_driver({})\n"
-        "thread.join(60)\n"
-        "assert not thread.is_alive()\n"
-        "drivers = [line for line in open('/proc/self/maps') if 'libEGL_' in line]\n"
-        "from viewer.rendering.gpu.context import headless_context\n"
-        "with headless_context() as context:\n"
-        "    framebuffer = context.simple_framebuffer((1, 1))\n"
-        "    framebuffer.clear(1.0, 0.0, 1.0, 1.0)\n"
-        "    print(len(drivers) > 0, *framebuffer.read(components=4))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert (done.stdout, done.stderr) == ("True 255 0 255 255\n", "")
-
-
-def test_driver_is_not_loaded_early_if_another_one_is_requested():
-    assert load_driver({"GLCONTEXT_LINUX_LIBEGL": "libnope.so"}) is None
-    assert load_driver({"GLCONTEXT_DEVICE_INDEX": "1"}) is None
 
 
 SIZE = (40, 30)

@@ -20,7 +20,6 @@ import moderngl
 from viewer.data_classes import dataclass
 from viewer.errors import RenderError, ViewerError
 from viewer.interrupts import deferred
-from viewer.rendering.gpu.egl_devices import set_log_level
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.shader_text import STORAGE_VERSION
 
@@ -111,7 +110,8 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     if sys.platform.startswith("linux"):
         # Explicit names avoid a search that starts other programs and takes 60 ms.
         settings |= {"backend": "egl", "libegl": _LIBEGL, "libgl": _LIBGL}
-        set_log_level()
+        # Mesa would print its own messages before the useful message.
+        os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
         with deferred():
             return moderngl.create_context(**settings)

@@ -1,12 +1,11 @@
-"""EGL devices: detection of graphics cards, assignment to worker processes, loading of drivers."""
+"""EGL devices: detection of graphics cards, and assignment to worker processes."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import sys
-import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from viewer.data_classes import dataclass
@@ -14,7 +13,6 @@ from viewer.data_classes import dataclass
 _MOST = 64  # maximum number of devices
 _EXTENSIONS = 0x3055
 _CUDA_DEVICE = 0x323A  # EGL_CUDA_DEVICE_NV of EGL_NV_device_cuda
-_PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT of EGL_EXT_platform_device
 _SOFTWARE = "EGL_MESA_device_software"
 
 
@@ -77,41 +75,6 @@ def _function(egl: ctypes.CDLL, name: str, result: Any) -> Any:
     find.restype = ctypes.c_void_p
     address = find(name.encode())
     return ctypes.CFUNCTYPE(result)(address) if address else None
-
-
-def set_log_level() -> None:
-    """Keep Mesa from printing its own messages before ours, which are clearer."""
-    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
-
-
-def load_driver(environment: Mapping[str, str] = os.environ) -> threading.Thread | None:
-    """Start to load the driver of the first device in a thread, which is returned.
-
-    Drivers are large, and most of the time to create a context passes in ``eglInitialize``. It is
-    called once per device: the context that is created later finds the driver loaded, or waits for
-    it. Meanwhile the main thread imports modules and reads files. Failures are ignored here, since
-    the creation of the context reports them. Nothing happens if glcontext is told to use other
-    libraries or another device.
-    """
-    if any(name.startswith("GLCONTEXT_") for name in environment):
-        return None
-    # The environment must not change while the driver reads it in the other thread.
-    set_log_level()
-    thread = threading.Thread(target=_initialize, name="graphics driver")
-    thread.start()
-    return thread
-
-
-def _initialize() -> None:
-    egl = _library()
-    handles = [] if egl is None else _handles(egl)
-    if egl is None or not handles:
-        return
-    display_of = _function(egl, "eglGetPlatformDisplayEXT", ctypes.c_void_p)
-    if display_of is not None:
-        # The display that glcontext asks for: equal arguments give the same one.
-        display = display_of(_PLATFORM_DEVICE, ctypes.c_void_p(handles[0]), None)
-        egl.eglInitialize(ctypes.c_void_p(display), None, None)
 
 
 def device_of_worker(
