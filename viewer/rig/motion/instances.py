@@ -64,8 +64,7 @@ class PoseTable:
 
     def __init__(self) -> None:
         self.arrays: PoseArrays | None = None
-        self._spare: PoseArrays | None = None
-        self._bytes: tuple[bytearray, ...] = ()
+        self._spare: PoseArrays | None = None  # memory of the values before
 
     def update(self, poses: Sequence[Pose]) -> Bools:
         """Gather the values of poses into ``arrays``; return which differ from before, (A,)."""
@@ -74,15 +73,14 @@ class PoseTable:
             changed = np.ones(len(poses), dtype=np.bool_)
         else:
             changed = np.zeros(len(poses), dtype=np.bool_)
-            for part, before, known in zip(new, old, self._bytes, strict=True):
-                # A bytearray compares whole blocks of memory, which is the usual case of no change.
-                if part.size and known != part:
-                    bits = part.reshape(len(poses), -1).view(np.int64)
-                    changed |= (bits != before.reshape(len(poses), -1).view(np.int64)).any(axis=1)
-        self._spare = new
-        if changed.any():
-            self._bytes = tuple(map(bytearray, new))
-            self.arrays, self._spare = new, old
+            for part, before in zip(new, old, strict=True):
+                # Bits, as -0 is another value, and a value that is not a number equals itself.
+                bits, known = (
+                    each.reshape(len(poses), -1).view(np.int64) for each in (part, before)
+                )
+                if not np.array_equal(bits, known):
+                    changed |= (bits != known).any(axis=1)
+        self.arrays, self._spare = new, old
         return changed
 
 
