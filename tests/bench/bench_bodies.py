@@ -29,7 +29,7 @@ def main(rounds: int = 30) -> None:
     report(shown, times, ("correctives", "no correctives"))
     for name in WAYS:
         ratio = median_ratio(times, f"skinning alone, {name}", "skinning alone, none")
-        print(f"  correctives by the {name} / none, skinning alone: {ratio:.2f}")
+        print(f"  correctives on the {name} / none, skinning alone: {ratio:.2f}")
     print(f"  DQS / LBS: {median_ratio(times, 'DQS', 'no correctives'):.2f}\n")
     if PIG.is_dir():
         pig = viewer.load(PIG).actors[0].figure
@@ -70,9 +70,9 @@ def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
             "correctives": lambda: frame(Skinning()),
             "no correctives": lambda: frame(Skinning(correctives=False)),
             "DQS": lambda: frame(Skinning("dqs", correctives=False)),
-            "skinning alone, card": lambda: skin("card", True),
-            "skinning alone, processor": lambda: skin("processor", True),
-            "skinning alone, none": lambda: skin("processor", False),
+            "skinning alone, gpu": lambda: skin("gpu", True),
+            "skinning alone, cpu": lambda: skin("cpu", True),
+            "skinning alone, none": lambda: skin("cpu", False),
         }
         times = interleaved(work, rounds)
         mesh.release()

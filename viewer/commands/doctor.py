@@ -354,7 +354,7 @@ def _frames() -> Iterator[Measured]:
 
 
 def _correctives(offscreen: Offscreen, crowd: Scene) -> Iterator[Measured]:
-    """Measure the sums of pose correctives in both ways; playback uses the faster one."""
+    """Measure the sums of pose correctives on CPU and GPU; playback uses the faster one."""
     import numpy as np
 
     from viewer.rendering.gpu.rest_buffers import RestBuffers
@@ -369,11 +369,10 @@ def _correctives(offscreen: Offscreen, crowd: Scene) -> Iterator[Measured]:
         rest = RestBuffers(offscreen.context, renderer.programs, renderer.buffers.mesh(figure))
         times = rest.corrective_times(weights)
         rest.release()
-    processor = times["processor"]
     for way, seconds in times.items():
-        ratio = 0.0 if way == "processor" else seconds / processor
-        subject = f"pose correctives of {len(poses)} bodies, {way}"
-        yield Measured(subject, 1e3 * seconds, ratio, "the processor" if ratio else "")
+        ratio = 0.0 if way == "cpu" else seconds / times["cpu"]
+        subject = f"pose correctives of {len(poses)} bodies on the {way.upper()}"
+        yield Measured(subject, 1e3 * seconds, ratio, "the CPU" if ratio else "")
 
 
 def _drawn(

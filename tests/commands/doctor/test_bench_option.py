@@ -20,7 +20,7 @@ def test_all_measurements_are_made(monkeypatch):
     assert len(found) == 13
     compared = [one.to for one in found if one.to]
     still = ["a still body", "a still body", "2 still bodies"]
-    assert compared == ["import numpy", *3 * ["OpenGL context"], *still, "the processor"]
+    assert compared == ["import numpy", *3 * ["OpenGL context"], *still, "the CPU"]
     assert len(commands) == 3 * 6  # a warm-up round and two measured rounds
 
 

@@ -229,7 +229,7 @@ def posed(ctx, monkeypatch):
     monkeypatch.setattr(corrective_sums, "_TRIAL", np.inf)
     owned = []
 
-    def make(figure, way="processor") -> PosedMesh:
+    def make(figure, way="cpu") -> PosedMesh:
         owned.append(PosedMesh(ctx, Programs(ctx), MeshBuffers(ctx, figure, [])))
         if figure.correctives is not None:
             owned[-1].mesh.corrective_sums.way = way
@@ -365,7 +365,7 @@ def test_actors_of_one_figure_may_have_different_shapes(ctx, family, posed, way)
 
 def test_changed_pose_on_a_card_uploads_only_matrices_and_weights(family, posed, written):
     figure = family("smplx")
-    mesh = posed(figure, "card")
+    mesh = posed(figure, "gpu")
     pose = shaped_pose(figure, 6)
     check(mesh, pose)
     written.clear()
@@ -411,7 +411,7 @@ def test_changed_shape_uploads_positions_and_normals(family, posed, written):
 
 def test_changed_pose_with_sums_of_the_processor_uploads_positions_once(family, posed, written):
     figure = family("smpl")
-    mesh = posed(figure, "processor")
+    mesh = posed(figure, "cpu")
     pose = shaped_pose(figure, 9)
     check(mesh, pose)
     written.clear()
@@ -476,7 +476,7 @@ def test_gpu_matches_the_reference(ctx, figures, name, way):
     programs = Programs(ctx)
     mesh = PosedMesh(ctx, programs, MeshBuffers(ctx, figure, []))
     mesh.mesh.corrective_sums.way = way
-    if way == "card" and not mesh.mesh.corrective_sums.can_use_card:
+    if way == "gpu" and not mesh.mesh.corrective_sums.can_use_gpu:
         pytest.skip("sparse offsets are summed on the processor")
     for seed in range(2):
         pose = random_body_pose(figure, seed)
@@ -502,10 +502,10 @@ def test_weights_of_instances_are_those_of_each_pose(figures):
 def test_large_numbers_of_offsets_are_summed_on_the_processor(ctx, figures, monkeypatch):
     mesh = MeshBuffers(ctx, figures["star"], [])
     sums = mesh.corrective_sums
-    assert sums.can_use_card and sums.way == "processor"
+    assert sums.can_use_gpu and sums.way == "cpu"
     limits = {**ctx.info, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE": 12 * 30 * 93 - 1}
     monkeypatch.setattr(type(ctx), "info", property(lambda self: limits))
-    assert not sums.can_use_card
+    assert not sums.can_use_gpu
     mesh.release()
 
 
@@ -541,7 +541,7 @@ def test_way_that_was_faster_when_both_were_timed_is_kept(ctx, figures, monkeypa
         for seed in range(3):
             pose = random_body_pose(figure, seed)
             mesh.update(pose)
-            assert sums.way == (faster if seed else "processor")
+            assert sums.way == (faster if seed else "cpu")
             wanted = viewer.deform(figure, pose)[0]
             size = box_size(bounding_box(wanted))
             assert np.abs(mesh.read()[0] - wanted).max() <= BODY_TOLERANCE * size

@@ -1,7 +1,7 @@
-"""Sums of pose correctives for many poses at once: on the processor, or by a compute shader.
+"""Sums of pose correctives for many poses at once: on the CPU, or on the GPU by a compute shader.
 
-Both ways are timed once their use has taken long enough, and the faster one is kept: software
-drivers share the processor, which multiplies matrices faster without them. ``viewer doctor
+Both ways are timed once sums have taken long enough on the CPU, and the faster one is kept: a
+software driver runs on the CPU, too, where matrix products are faster without it. ``viewer doctor
 --bench`` prints both times.
 """
 
@@ -23,11 +23,11 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import Correctives, active_rows
 from viewer.rig.bodies.offsets import SparseOffsets
 
-Way: TypeAlias = Literal["processor", "card"]
-WAYS: tuple[Way, ...] = ("processor", "card")
+Way: TypeAlias = Literal["cpu", "gpu"]
+WAYS: tuple[Way, ...] = ("cpu", "gpu")
 """Methods of summing pose correctives."""
 
-_TRIAL = 0.05  # seconds of sums on the processor after which both ways are timed
+_TRIAL = 0.05  # seconds of sums on the CPU after which both ways are timed
 _TRIED = 64  # number of correctives in the trial: enough to outweigh the cost of a call
 _ACTORS, _COLUMNS = 8, 64  # actors per invocation, columns per work group: see correctives.comp
 _MOST_GROUPS = 65535  # number of work groups in a row that every driver allows
@@ -37,17 +37,17 @@ _Rows: TypeAlias = NDArray[np.float32]
 class CorrectiveSums:
     """Sums of the pose correctives of one figure.
 
-    ``sources``: (R,), vertex of the figure for each split vertex. ``way``: the present method.
+    ``sources``: (R,), vertex of the figure for each split vertex. ``way``: the method in use.
     """
 
     def __init__(self, context: moderngl.Context, correctives: Correctives, sources: Ints) -> None:
         self.context, self.correctives, self.sources = context, correctives, sources
-        self.way: Way = "processor"
+        self.way: Way = "cpu"
         self._spent = 0.0
         self._is_timed = False
         self._product: _Rows | None = None
         self._owner = Owner()
-        self._card: tuple[moderngl.Buffer, ...] = ()
+        self._inputs: tuple[moderngl.Buffer, ...] = ()
         self._weights: moderngl.Buffer | None = None
 
     def write(
@@ -67,10 +67,10 @@ class CorrectiveSums:
             fewer = weights.copy()
             fewer[:, np.flatnonzero(weights.any(axis=0))[_TRIED:]] = 0.0
             times = self.times(programs, fewer, rest, positions, out)
-            if times.get("card", math.inf) < times["processor"]:
-                self.way = "card"
+            if times.get("gpu", math.inf) < times["cpu"]:
+                self.way = "gpu"
             else:
-                self._free_card()
+                self._free_gpu()
         start = time.perf_counter()
         self._run(self.way, programs, weights, rest, positions, out)
         self._spent += time.perf_counter() - start
@@ -85,7 +85,7 @@ class CorrectiveSums:
     ) -> dict[Way, float]:
         """Return the seconds that ``write`` takes in each way that the driver offers."""
         found: dict[Way, float] = {}
-        for way in WAYS[: 1 + self.can_use_card]:
+        for way in WAYS[: 1 + self.can_use_gpu]:
             for _ in range(2):  # the first run compiles and uploads
                 self.context.finish()
                 start = time.perf_counter()
@@ -103,13 +103,13 @@ class CorrectiveSums:
         positions: moderngl.Buffer,
         out: moderngl.Buffer,
     ) -> None:
-        if way == "card":
-            self._on_card(programs, weights, positions, out)
+        if way == "gpu":
+            self._on_gpu(programs, weights, positions, out)
         else:
-            self._on_processor(weights, rest, out)
+            self._on_cpu(weights, rest, out)
 
     @property
-    def can_use_card(self) -> bool:
+    def can_use_gpu(self) -> bool:
         """Whether the driver has compute shaders and room for the offsets."""
         if isinstance(self.correctives.offsets, SparseOffsets):
             return False  # most of the work would be multiplications by 0
@@ -118,7 +118,7 @@ class CorrectiveSums:
             return False
         return 0 < 12 * count * vertices <= storage_limit(self.context)
 
-    def _on_processor(self, weights: Floats, rest: _Rows, out: moderngl.Buffer) -> None:
+    def _on_cpu(self, weights: Floats, rest: _Rows, out: moderngl.Buffer) -> None:
         sums = self._summed(weights).reshape(len(weights), -1, 3)
         sums += rest
         out.write(sums.take(self.sources, axis=1))
@@ -136,7 +136,7 @@ class CorrectiveSums:
             total += weights[:, run].astype("f4") @ self._product[run]
         return total
 
-    def _on_card(
+    def _on_gpu(
         self,
         programs: Programs,
         weights: Floats,
@@ -145,10 +145,10 @@ class CorrectiveSums:
     ) -> None:
         """Run ``correctives.comp``; correctives whose weights are all 0 are not sent."""
         program, context, keep = programs.compute("correctives"), self.context, self._owner.keep
-        if not self._card:
+        if not self._inputs:
             offsets = self.correctives.values()
             with self._owner.guard():
-                self._card = (
+                self._inputs = (
                     keep(buffer(context, self.sources, "i4")),
                     keep(buffer(context, offsets, "f4")),
                 )
@@ -163,7 +163,7 @@ class CorrectiveSums:
             self._weights = None
             self._weights = reserved(context, len(data), "weights of pose correctives")
         self._weights.write(data)
-        for binding, item in enumerate((out, positions, *self._card, self._weights)):
+        for binding, item in enumerate((out, positions, *self._inputs, self._weights)):
             item.bind_to_storage_buffer(binding)
         values = {
             "u_n_actors": count,
@@ -176,13 +176,13 @@ class CorrectiveSums:
         program.run(columns, len(padded) // _ACTORS)
         context.memory_barrier()
 
-    def _free_card(self) -> None:
+    def _free_gpu(self) -> None:
         self._owner.release()
-        self._card = ()
+        self._inputs = ()
         if self._weights is not None:
             self._weights.release()
         self._weights = None
 
     def release(self) -> None:
         """Free every buffer."""
-        self._free_card()
+        self._free_gpu()
