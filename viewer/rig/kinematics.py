@@ -151,7 +151,6 @@ def are_alike(lowest: Floats, highest: Floats) -> Bools:
     return alike
 
 
-def is_rigid(palette: Floats) -> Bools:
-    """Return whether all of (..., J, 4, 4) only rotate and move, up to one common uniform scale."""
-    sizes = rigid_sizes(palette)
+def are_rigid(sizes: Floats) -> Bools:
+    """Return whether all joints of ``rigid_sizes`` (..., J) only rotate, with one common scale."""
     return are_alike(sizes.min(axis=-1, initial=np.inf), sizes.max(axis=-1, initial=0.0))

@@ -21,7 +21,7 @@ from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
-from viewer.rendering.view import View
+from viewer.rendering.view import View, view_of
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
@@ -36,7 +36,7 @@ VARYINGS = "v_position", "v_normal"
 class Instances:
     """Instances with vertices that are read back instead of drawn."""
 
-    def __init__(self, ctx, figure: Figure, way: Way = "processor") -> None:
+    def __init__(self, ctx, figure: Figure, way: Way = "cpu") -> None:
         self.context, self.programs = ctx, Programs(ctx)
         self.mesh = MeshBuffers(ctx, figure, [])
         if figure.correctives is not None:
@@ -465,3 +465,35 @@ def test_posed_vertices_of_all_crowds_are_bounded(offscreen, work, monkeypatch):
     with offscreen.context:
         offscreen.renderer.buffers.keep_only([])
     assert (offscreen.render(more, size, camera, options, box) == first).all()
+
+
+def test_room_for_more_actors_stays_within_a_storage_buffer(ctx, monkeypatch):
+    figure = random_figure(np.random.default_rng(8), 4)
+    instances = Instances(ctx, figure)
+    vertices = instances.instances.vertices
+    limits = {**ctx.info, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE": 13 * vertices.size + 1}
+    monkeypatch.setattr(moderngl.Context, "info", property(lambda self: limits))
+    sizes = []
+    for count in (8, 9, 13):
+        vertices.reserve(count)
+        sizes.append(vertices.posed.size // vertices.size)
+    assert sizes == [8, 12, 13]
+    instances.release()
+
+
+def test_back_faces_of_closed_crowds_are_hidden_also_when_joints_scale(ctx):
+    figure = viewer.load(bundled_body()).actors[0].figure
+    instances, actors = Instances(ctx, figure), cast(figure, 3, reach=0.2)
+    view = view_of(default_camera(Scene(actors), (64, 48)), (64, 48), scene_box(Scene(actors)))
+
+    def hides_backs() -> bool:
+        instances.instances.vertices.reserve(len(actors))
+        instances.instances.update(actors, Skinning())
+        return instances.instances.hides_backs(view, Skinning())
+
+    assert hides_backs()
+    actors[1].pose.scales[3] = 1.0, 1.2, 0.9
+    assert hides_backs()
+    actors[1].pose.scales[3] = -1.0, 1.2, 0.9  # a part of the surface is turned inside out
+    assert not hides_backs()
+    instances.release()

@@ -10,7 +10,7 @@ from rig.hand_made import matrix, skeleton, turn_x, turn_y, turn_z
 import viewer
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import is_rigid
+from viewer.rig.kinematics import are_rigid, rigid_sizes
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
@@ -144,12 +144,16 @@ RIGID = [np.eye(4), matrix(turn_x(2.0), (3, 4, 5))]
     ],
 )
 def test_rigid_palettes_are_recognised(palette, expected):
-    assert is_rigid(np.array(palette)).tolist() is expected
+    assert are_rigid(rigid_sizes(np.array(palette))).tolist() is expected
 
 
 def test_palettes_of_several_poses_are_checked_one_by_one():
     stretched = [RIGID[0], np.diag([1.0, 2.0, 1.0, 1.0])]
-    assert is_rigid(np.array([RIGID, stretched, RIGID])).tolist() == [True, False, True]
+    assert are_rigid(rigid_sizes(np.array([RIGID, stretched, RIGID]))).tolist() == [
+        True,
+        False,
+        True,
+    ]
 
 
 @pytest.mark.parametrize("blend_factor", [0.0, 0.3, 1.0])

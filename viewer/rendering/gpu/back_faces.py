@@ -14,7 +14,7 @@ import numpy as np
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.joint_spheres import box_spheres, skin_spheres
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Shell
 from viewer.rig.kinematics import posed_skeleton
@@ -52,8 +52,9 @@ class BackFaces:
             positions = figure.require_mesh().positions
             self._spheres = box_spheres(bounding_box(positions))
             self._borders = positions[shell.borders]
-        elif _has_one_side(figure, pose):
-            palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
+            return
+        palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
+        if have_one_side(palette):
             self._spheres = skin_spheres(figure, palette)
             self._borders = self._posed_borders(figure, pose, how, shell)
 
@@ -115,8 +116,8 @@ def is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
     return _closed.get(figure, None, lambda: shell.is_closed(figure.require_mesh().positions))
 
 
-def _has_one_side(figure: Figure, pose: Pose) -> bool:
-    """Return whether either all joints or none reflect, and no joint's matrix is singular."""
-    palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
-    volumes = np.linalg.det(palette[:, :3, :3])
-    return bool((volumes > 0.0).all() or (volumes < 0.0).all())
+def have_one_side(palette: Floats) -> Bools:
+    """Return whether all joints of (..., J, 4, 4) or none reflect, and no matrix is singular."""
+    volumes = np.linalg.det(palette[..., :3, :3])
+    same: Bools = (volumes > 0.0).all(axis=-1) | (volumes < 0.0).all(axis=-1)
+    return same

@@ -89,8 +89,7 @@ class PosedMesh:
         if figure.correctives is not None and how.correctives:
             weights = pose_weights(figure.correctives, skeleton, pose)[None]
         sizes = palette_sizes(skin, pose.scales, matrices)
-        made = self._vertices.skin(_ALONE, figure, how, matrices, weights, sizes)
-        if not made.are_rigid[0]:
+        if not self._vertices.skin(_ALONE, figure, how, matrices, weights, sizes)[0]:
             signs = np.sign(np.linalg.det(matrices[0, :, :3, :3]))
             self._is_mirrored = bool(self.mesh.skin(how).joint_fractions @ signs < 0.0)
 

@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.data_classes import dataclass
+from viewer.rendering.gpu.context import storage_limit
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.rest_buffers import RestBuffers
@@ -26,7 +26,7 @@ from viewer.rendering.gpu.upload import (
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
-from viewer.rig.kinematics import are_alike
+from viewer.rig.kinematics import are_rigid
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 
@@ -38,31 +38,12 @@ _MOST_TOGETHER = 1024  # maximum number of actors in one upload
 _MOST_RESTS = 64 << 20  # maximum size of the rest positions with correctives in one upload, bytes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Palettes:
-    """Joint matrices of C poses about the centres of mesh and pose, for the skinning shader."""
-
-    matrices: Floats
-    """(C, J, 4, 4). T(-posed centre) M T(rest centre)."""
-    centers: Floats
-    """(C, 3). Posed centres, figure space: the mean motion of the figure, by its weights."""
-    sizes: Floats
-    """(C, J). Squares of the joints' scales; see ``rigid_sizes``."""
-
-    @property
-    def are_rigid(self) -> Bools:
-        """Whether the joints of each pose only rotate, with one common scale: (C,)."""
-        return are_alike(
-            self.sizes.min(axis=1, initial=np.inf), self.sizes.max(axis=1, initial=0.0)
-        )
-
-
 class PosedVertices:
     """Posed vertices of a number of actors.
 
     ``posed``: R rows for every actor, one per split vertex: position relative to the actor's
-    centre, and unit normal. ``centers``: (A, 3) in figure space. ``n_skinned``: number of actors
-    skinned so far, the same one several times. A framebuffer must be bound while skinning.
+    centre, and unit normal. ``centers``: (A, 3) in figure space. A framebuffer must be bound while
+    skinning.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs, mesh: MeshBuffers) -> None:
@@ -73,7 +54,6 @@ class PosedVertices:
         self._own: moderngl.Buffer | None = None
         self._shared: SharedVertices | None = None
         self.centers: Floats = np.zeros((0, 3))
-        self.n_skinned = 0
         self._textures: dict[str, moderngl.Texture] = {}
         self._together = max(1, min(_MOST_TOGETHER, _MOST_RESTS // mesh.positions.size))
         self._room = 0  # number of actors in the textures
@@ -86,7 +66,9 @@ class PosedVertices:
             shared.reserve(count * self.size)
         if (self._shared, self._has_room(count)) == (shared, True):
             return
-        room = max(count, len(self.centers) * 3 // 2)  # adding actors rarely reallocates
+        # Half more, so that adding actors rarely reallocates, if shaders can read so much at once.
+        most = storage_limit(self.context) // self.size if self.size else 0
+        room = max(count, min(len(self.centers) * 3 // 2, most))
         self._free_own()
         self._shared, self.centers = shared, np.zeros((0, 3))
         if shared is None:
@@ -121,21 +103,21 @@ class PosedVertices:
         matrices: Floats,
         weights: Floats | None,
         sizes: Floats,
-    ) -> Palettes:
-        """Skin the actors ``rows``, (C,) ascending, of one shaped figure.
+    ) -> Bools:
+        """Skin the actors ``rows``, (C,) ascending, of one shaped figure; return which are rigid.
 
         ``matrices``: (C, J, 4, 4) skinning matrices, bind to posed; they are changed. ``weights``:
         (C, P) of the pose correctives, if used. ``sizes``: ``palette_sizes`` of the matrices.
         """
         self._rest.reshape(figure)
-        made = self._about_centers(how, matrices, sizes)
-        self.centers[rows] = made.centers
+        self.centers[rows] = self._move_origins(how, matrices)
+        rigid = np.broadcast_to(are_rigid(sizes), len(rows))
         for start in range(0, len(rows), self._together):
             part = slice(start, start + self._together)
-            self._upload(figure, how, made.matrices[part], made.centers[part])
+            self._upload(figure, how, matrices[part], self.centers[rows[part]])
             self._rest.correct(None if weights is None else weights[part])
-            self._run(rows[part], how, not made.are_rigid[part].all())
-        return made
+            self._run(rows[part], how, not rigid[part].all())
+        return rigid
 
     def unpose(self) -> None:
         """Store the bind pose as the vertices of the first actor."""
@@ -146,16 +128,17 @@ class PosedVertices:
         write_stacked(self._texture("u_places"), places)
         self._run(np.zeros(1, np.intp), Skinning(), False, attached=False)
 
-    def _about_centers(self, how: Skinning, matrices: Floats, sizes: Floats) -> Palettes:
+    def _move_origins(self, how: Skinning, matrices: Floats) -> Floats:
+        """Turn M into T(-posed centre) M T(rest centre), in place; return posed centres (C, 3)."""
+        # The posed centre is the mean motion of the figure, by its weights: what is left is small.
         linear, places = matrices[..., :3, :3], matrices[..., :3, 3]
         places += linear @ self.mesh.center
         fractions = self.mesh.skin(how).joint_fractions
-        centers = fractions @ places if fractions.any() else self.mesh.center
-        places -= np.broadcast_to(centers, (len(matrices), 3))[:, None]
-        shape = matrices.shape[:2]
-        return Palettes(
-            matrices, np.broadcast_to(centers, (shape[0], 3)), np.broadcast_to(sizes, shape)
-        )
+        centers: Floats = np.broadcast_to(self.mesh.center, (len(matrices), 3))
+        if fractions.any():
+            centers = fractions @ places
+        places -= centers[:, None]
+        return centers
 
     def _upload(self, figure: Figure, how: Skinning, matrices: Floats, centers: Floats) -> None:
         """Upload joint matrices and centres of some actors, the only data that a pose changes."""
@@ -214,7 +197,6 @@ class PosedVertices:
                 instances=last - first,
                 buffer_offset=int(rows[first]) * self.size,
             )
-        self.n_skinned += len(rows)
         if self._shared is not None:
             self._shared.holder = self
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.rendering.gpu.back_faces import are_before, is_together
+from viewer.rendering.gpu.back_faces import are_before, have_one_side, is_together
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_vertices import PosedVertices, skinning_options_key
@@ -232,8 +232,8 @@ class InstanceBuffers:
         if figure.correctives is not None and how.correctives:
             chosen = [poses[row] for row in rows.tolist()]
             weights = _pose_weights(figure, chosen, rotations)
-        made = self.vertices.skin(rows, figure, how, matrices, weights, sizes)
-        self._has_one_side[rows] = made.are_rigid
+        rigid = self.vertices.skin(rows, figure, how, matrices, weights, sizes)
+        self._has_one_side[rows] = rigid | have_one_side(matrices) if not rigid.all() else True
         self._figure = figure
 
     def _place(self, actors: Sequence[Actor], poses: Sequence[Pose]) -> None:
