@@ -204,10 +204,14 @@ def _sagittal_plane(
     solid: Solid, up: Floats, lateral: Floats | None
 ) -> tuple[Floats, float, float]:
     """Return normal and offset of the vertical plane of best mirror symmetry, and the symmetry."""
+    from scipy import ndimage
+
+    # Within one voxel, the mirror image of the boundary is inside or outside by chance.
+    around = ndimage.binary_dilation(solid.inside, np.ones((3, 3, 3)))
     centers = solid.centers(solid.voxels)
     some = centers[:: max(1, len(centers) // _MIRRORED)]
     if lateral is not None:
-        return lateral, *_symmetry(solid, some, lateral)
+        return lateral, *_symmetry(solid, around, some, lateral)
     # Two horizontal vectors, along coordinate axes if up is one.
     first = np.cross(up, np.eye(3)[int(np.abs(up).argmin())])
     first = first / np.linalg.norm(first)
@@ -215,7 +219,7 @@ def _sagittal_plane(
 
     def tried(angle: float) -> tuple[float, float, Floats, float]:
         normal = np.cos(angle) * first + np.sin(angle) * second
-        offset, symmetry = _symmetry(solid, some, normal)
+        offset, symmetry = _symmetry(solid, around, some, normal)
         return symmetry, float(np.ptp(some @ normal)), normal, offset
 
     angles = np.arange(_ANGLES) * np.pi / _ANGLES
@@ -232,13 +236,9 @@ def _sagittal_plane(
     return normal, offset, symmetry
 
 
-def _symmetry(solid: Solid, points: Floats, normal: Floats) -> tuple[float, float]:
+def _symmetry(solid: Solid, around: Bools, points: Floats, normal: Floats) -> tuple[float, float]:
     """Return the offset of the best plane with this normal, and the fraction mirrored inside."""
-    from scipy import ndimage
-
     along = points @ normal
-    # Within one voxel, the mirror image of the boundary is inside or outside by chance.
-    around = ndimage.binary_dilation(solid.inside, np.ones((3, 3, 3)))
     # The plane halves a symmetric solid; props on one side move the halving plane a little.
     offsets = float(np.median(along)) + solid.spacing * np.linspace(-2.0, 2.0, 9)
     fractions = []
