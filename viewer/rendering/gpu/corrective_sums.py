@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import moderngl
 import numpy as np
@@ -34,6 +34,20 @@ _MOST_GROUPS = 65535  # number of work groups in a row that every driver allows
 _Rows: TypeAlias = NDArray[np.float32]
 
 
+class Request(NamedTuple):
+    """Sums to write for A poses."""
+
+    programs: Programs
+    weights: Floats
+    """(A, P). Weights of the correctives."""
+    rest: NDArray[np.float32]
+    """(V, 3). Rest positions of the figure, relative to the mesh's centre."""
+    positions: moderngl.Buffer
+    """The same of the split vertices, (R, 3)."""
+    out: moderngl.Buffer
+    """Receives the positions with correctives, (A, R, 3) float32."""
+
+
 class CorrectiveSums:
     """Sums of the pose correctives of one figure.
 
@@ -50,63 +64,38 @@ class CorrectiveSums:
         self._inputs: tuple[moderngl.Buffer, ...] = ()
         self._weights: moderngl.Buffer | None = None
 
-    def write(
-        self,
-        programs: Programs,
-        weights: Floats,
-        rest: _Rows,
-        positions: moderngl.Buffer,
-        out: moderngl.Buffer,
-    ) -> None:
-        """Write rest positions with correctives, (A, R, 3) float32, for weights (A, P).
-
-        ``rest``: (V, 3), vertices of the figure; ``positions``: the same, (R, 3) on the GPU.
-        """
+    def write(self, request: Request) -> None:
+        """Write rest positions with correctives."""
         if self._spent > _TRIAL and not self._is_timed:
             self._is_timed = True
-            fewer = weights.copy()
-            fewer[:, np.flatnonzero(weights.any(axis=0))[_TRIED:]] = 0.0
-            times = self.times(programs, fewer, rest, positions, out)
+            fewer = request.weights.copy()
+            fewer[:, np.flatnonzero(fewer.any(axis=0))[_TRIED:]] = 0.0
+            times = self.times(request._replace(weights=fewer))
             if times.get("gpu", math.inf) < times["cpu"]:
                 self.way = "gpu"
             else:
                 self._free_gpu()
         start = time.perf_counter()
-        self._run(self.way, programs, weights, rest, positions, out)
+        self._run(self.way, request)
         self._spent += time.perf_counter() - start
 
-    def times(
-        self,
-        programs: Programs,
-        weights: Floats,
-        rest: _Rows,
-        positions: moderngl.Buffer,
-        out: moderngl.Buffer,
-    ) -> dict[Way, float]:
+    def times(self, request: Request) -> dict[Way, float]:
         """Return the seconds that ``write`` takes in each way that the driver offers."""
         found: dict[Way, float] = {}
         for way in WAYS[: 1 + self.can_use_gpu]:
             for _ in range(2):  # the first run compiles and uploads
                 self.context.finish()
                 start = time.perf_counter()
-                self._run(way, programs, weights, rest, positions, out)
+                self._run(way, request)
                 self.context.finish()
                 found[way] = time.perf_counter() - start
         return found
 
-    def _run(
-        self,
-        way: Way,
-        programs: Programs,
-        weights: Floats,
-        rest: _Rows,
-        positions: moderngl.Buffer,
-        out: moderngl.Buffer,
-    ) -> None:
+    def _run(self, way: Way, request: Request) -> None:
         if way == "gpu":
-            self._on_gpu(programs, weights, positions, out)
+            self._on_gpu(request)
         else:
-            self._on_cpu(weights, rest, out)
+            self._on_cpu(request)
 
     @property
     def can_use_gpu(self) -> bool:
@@ -118,10 +107,10 @@ class CorrectiveSums:
             return False
         return 0 < 12 * count * vertices <= storage_limit(self.context)
 
-    def _on_cpu(self, weights: Floats, rest: _Rows, out: moderngl.Buffer) -> None:
-        sums = self._summed(weights).reshape(len(weights), -1, 3)
-        sums += rest
-        out.write(sums.take(self.sources, axis=1))
+    def _on_cpu(self, request: Request) -> None:
+        sums = self._summed(request.weights).reshape(len(request.weights), -1, 3)
+        sums += request.rest
+        request.out.write(sums.take(self.sources, axis=1))
 
     def _summed(self, weights: Floats) -> _Rows:
         """Return the sums of the correctives, (A, 3 V), for weights (A, P)."""
@@ -136,15 +125,10 @@ class CorrectiveSums:
             total += weights[:, run].astype("f4") @ self._product[run]
         return total
 
-    def _on_gpu(
-        self,
-        programs: Programs,
-        weights: Floats,
-        positions: moderngl.Buffer,
-        out: moderngl.Buffer,
-    ) -> None:
+    def _on_gpu(self, request: Request) -> None:
         """Run ``correctives.comp``; correctives whose weights are all 0 are not sent."""
-        program, context, keep = programs.compute("correctives"), self.context, self._owner.keep
+        program, weights = request.programs.compute("correctives"), request.weights
+        context, keep = self.context, self._owner.keep
         if not self._inputs:
             offsets = self.correctives.values()
             with self._owner.guard():
@@ -163,7 +147,9 @@ class CorrectiveSums:
             self._weights = None
             self._weights = reserved(context, len(data), "weights of pose correctives")
         self._weights.write(data)
-        for binding, item in enumerate((out, positions, *self._inputs, self._weights)):
+        for binding, item in enumerate(
+            (request.out, request.positions, *self._inputs, self._weights)
+        ):
             item.bind_to_storage_buffer(binding)
         values = {
             "u_n_actors": count,

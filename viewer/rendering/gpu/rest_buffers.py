@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RenderError
-from viewer.rendering.gpu.corrective_sums import Way
+from viewer.rendering.gpu.corrective_sums import Request, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
 from viewer.rendering.gpu.program import RESTS_BINDING, Programs
 from viewer.rendering.gpu.upload import float32, reserved
@@ -58,29 +58,24 @@ class RestBuffers:
         self.n_corrected = 0
         if weights is None or not weights.any():
             return
-        self._reserve(len(weights))
-        self.mesh.corrective_sums.write(self.programs, weights, *self._buffers())
+        self.mesh.corrective_sums.write(self._request(weights))
         self.n_corrected = len(weights)
 
     def corrective_times(self, weights: Floats) -> dict[Way, float]:
         """Return the seconds that ``correct`` takes in each way; see ``CorrectiveSums``."""
-        self._reserve(len(weights))
-        return self.mesh.corrective_sums.times(self.programs, weights, *self._buffers())
+        return self.mesh.corrective_sums.times(self._request(weights))
 
-    def _reserve(self, count: int) -> None:
-        size = count * self.mesh.positions.size
+    def _request(self, weights: Floats) -> Request:
+        size = len(weights) * self.mesh.positions.size
         if self.corrected is None or self.corrected.size < size:
             if self.corrected is not None:
                 self.corrected.release()
             self.corrected = None
             self.corrected = reserved(self.context, size, "rest positions with pose correctives")
             self._version += 1
-
-    def _buffers(self) -> tuple[NDArray[np.float32], moderngl.Buffer, moderngl.Buffer]:
         if self._rest is None:
             self._rest = float32(self._shape.require_mesh().positions - self.mesh.center)
-        assert self.corrected is not None  # reserved
-        return self._rest, self.positions, self.corrected
+        return Request(self.programs, weights, self._rest, self.positions, self.corrected)
 
     @property
     def version(self) -> tuple[int, bool, bool]:
