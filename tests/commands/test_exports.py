@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.errors import UnsupportedFormatError, ViewerError
+from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
 
 
 @pytest.fixture
@@ -73,3 +73,15 @@ def test_function_stays_a_function_when_exporters_are_imported():
     import viewer.exporters.gltf
 
     assert callable(viewer.export) and not hasattr(viewer.export, "EXPORTERS")
+
+
+def test_opened_files_are_not_replaced(turning, tmp_path):
+    path = tmp_path / "own.glb"
+    viewer.export(turning, path)
+    before, scene = path.read_bytes(), viewer.load(path)
+    for what in (scene, scene[0]):
+        with pytest.raises(OutputError, match=r"own\.glb: .*input"):
+            viewer.export(what, path)
+    assert path.read_bytes() == before
+    viewer.export(scene, tmp_path / "other.glb")
+    viewer.export(scene, tmp_path / "other.glb")  # other files are

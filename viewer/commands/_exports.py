@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,13 +70,11 @@ def export(
     ViewerError
         If there are no such frames.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or is one of those that were opened.
     """
-    from dataclasses import replace
-
     from viewer.commands._pictures import scene_of, without_dashes
-    from viewer.commands.convert import selected
-    from viewer.exporters import ExportOptions, export
+    from viewer.commands.convert import check_outputs, selected
+    from viewer.exporters import ExportOptions, export, output_files
     from viewer.rig.motion.evaluation import pose_actors
 
     chosen = replace(options) if options is not None else ExportOptions()
@@ -93,4 +92,7 @@ def export(
             scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
             pose_actors(scene.actors, time)
         selection, chosen, notes = selected(asked, chosen, scene, Path(path))
+        # Files of the scene may still be read.
+        files = output_files(selection, Path(path), chosen)
+        check_outputs(files, Path(path), scene.files, force=True)
         return [*export(selection, path, options=chosen), *notes]

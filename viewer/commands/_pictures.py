@@ -206,10 +206,13 @@ def video(
 
 def scene_of(what: Scene | Actor, name: str) -> Scene:
     """Return a scene of what a function was given; ``name``: of the function, for errors."""
-    scene = Scene([what]) if isinstance(what, Actor) else what
-    if not isinstance(scene, Scene):
-        raise ViewerError(f"{name}: expected a scene or an actor, found {type(scene).__name__}")
-    return scene
+    if isinstance(what, Scene):
+        return what
+    if not isinstance(what, Actor):
+        raise ViewerError(f"{name}: expected a scene or an actor, found {type(what).__name__}")
+    files = [origin.path for origin in what.figure.origins]
+    files += [] if what.clip_origin is None else [what.clip_origin[0]]
+    return Scene([what], files=files)
 
 
 def _display(
@@ -220,8 +223,10 @@ def _display(
 ) -> DisplayOptions:
     """Return a copy of display options with the given values, all of which are checked."""
     shown = replace(DisplayOptions(quality="normal") if options is None else options)
-    shown.background = background or shown.background
-    shown.quality = quality or shown.quality
+    if background is not None:
+        shown.background = background
+    if quality is not None:
+        shown.quality = quality
     if scalar is not None:
         shown.scalar, shown.shading = scalar, "scalar"
     check_choices(shown)
@@ -229,8 +234,10 @@ def _display(
 
 
 def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
-    for note in scalar_notes(scene, options):
-        raise ViewerError(note)
+    """Raise ViewerError if no figure has the numbers that are shown as colours."""
+    notes = scalar_notes(scene, options)
+    if notes:
+        raise ViewerError(notes[0])
 
 
 @contextmanager

@@ -9,7 +9,7 @@ converted part by part (``convert_streamed``), if no option needs the whole moti
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -149,11 +149,8 @@ def run(arguments: argparse.Namespace) -> int:
         saving = _saving_joint_map(joint_map, asked, scene, output, arguments.force)
         with saving, shown_progress("converting"):
             selection, options, chosen = selected(asked, options, scene, output)
-            files, inputs = output_files(selection, output, options), inputs_of(asked, scene)
-            if output.suffix:
-                check_targets(files, inputs, arguments.force)
-            else:
-                check_folder_target(files[0], inputs, arguments.force)
+            files = output_files(selection, output, options)
+            check_outputs(files, output, inputs_of(asked, scene), arguments.force)
             notes = [*export(selection, output, options=options), *chosen, *baked]
     for written in notes:
         note_found(written)
@@ -184,6 +181,14 @@ def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, for
     is_pose = all("pose" in kind.stores for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(asked), force)
+
+
+def check_outputs(files: list[Path], output: Path, inputs: Sequence[Path], force: bool) -> None:
+    """Refuse to write files or, if ``output`` has no suffix, a folder; see ``check_targets``."""
+    if output.suffix:
+        check_targets(files, inputs, force)
+    else:
+        check_folder_target(files[0], inputs, force)
 
 
 @contextmanager

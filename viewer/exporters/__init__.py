@@ -229,39 +229,10 @@ def export(
     meta: VrmMeta | None = None,
     options: ExportOptions | None = None,
 ) -> list[Diagnostic]:
-    """Write an actor in its current pose, or a selection of actors with their motions.
+    """Write an actor in its current pose, or a selection; return notes as ``viewer.export`` does.
 
-    Parameters
-    ----------
-    selection : Actor or Selection
-        Figure and pose; its placement in the scene is omitted. A selection has several actors, with
-        their poses, their own keys, or frames, and the scene in which they are placed.
-    path : str or Path
-        The suffix selects the exporter; existing files are replaced. Either all files are written
-        or none. ``{person}`` in the name selects a file for each actor.
-    skinning : Skinning, optional
-        Skinning method and options.
-    optimizes : bool
-        Quantise vertices, which glTF and VRM support.
-    meta : VrmMeta, optional
-        Name, authors and licence of a VRM character; those of its file if omitted.
-    options : ExportOptions, optional
-        All options, including those above.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store, with errors. ``str``
-        gives the text of each.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If no exporter writes this suffix, or it cannot quantise.
-    RigError
-        If the figure lacks the data that the format needs, or nobody is present.
-    OutputError
-        If a file cannot be written.
+    Either all files are written or none. A selection has several actors, with their poses, their
+    own keys, or frames, and the scene in which they are placed.
     """
     chosen = replace(options) if options is not None else ExportOptions()
     chosen.skinning = chosen.skinning if skinning is None else skinning

@@ -66,13 +66,13 @@ def test_similarity_removes_scale_but_no_reflection():
 
 
 def test_units_are_converted():
-    inches = viewer.figure(
+    centimetres = viewer.figure(
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]) / 0.01,
         [[0, 1, 2]],
         joints=np.array([[0, 0, 0], [0, 1, 0]]) / 0.01,
         unit="cm",
     )
-    assert pose_errors(moving(figure=inches), moving()).mpjpe < 1e-9
+    assert pose_errors(moving(figure=centimetres), moving()).mpjpe < 1e-9
 
 
 def test_only_frames_of_both_count():
