@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.lint._surface import surface_of
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Indices
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import sided_words
+from viewer.rig.retargeting.mirror import word_partners
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import bind_positions
 
 _EXACT = 1e-4  # maximum distance of a vertex from the image of its counterpart, of the size
 _SYMMETRIC = 0.5  # minimum fraction of vertices with a counterpart in a symmetric mesh
-_OTHER = {"left": "right", "right": "left"}
 _mirrors: Memo[Figure, Mirror | None] = Memo()
 
 
@@ -35,7 +33,7 @@ class Mirror:
     """(V,): counterpart of each vertex; itself if it has none."""
     known: Bools
     """(V,): vertices that have one and are the first at their position."""
-    joints: Indices
+    joints: Ints
     """(J,): counterpart of each joint by name; -1 if it has a side, but no counterpart."""
     errors: Floats
     """(J,): distances of the joints' bind positions from the images of their counterparts."""
@@ -46,17 +44,9 @@ def mirror_of(figure: Figure) -> Mirror | None:
     return _mirrors.get(figure, (), lambda: _mirror(figure))
 
 
-def name_partners(skeleton: Skeleton) -> Indices:
-    """Return the joint of the other side with the same word (J,); itself without a side; or -1."""
-    words = sided_words(skeleton.names)
-    counts, place = Counter(words), {word: joint for joint, word in enumerate(words)}
-    partners = np.arange(skeleton.n_joints)
-    for joint, (side, word) in enumerate(words):
-        if side:
-            other = (_OTHER[side], word)
-            is_clear = counts[other] == 1 == counts[side, word]
-            partners[joint] = place[other] if is_clear else -1
-    return partners
+def name_partners(skeleton: Skeleton) -> Ints:
+    """Return ``word_partners`` of the joints' names: (J,)."""
+    return word_partners(sided_words(skeleton.names))
 
 
 def _mirror(figure: Figure) -> Mirror | None:

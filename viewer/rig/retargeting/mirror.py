@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 # Maximum distance of a joint from its counterpart's mirror image, relative to the figure's size.
 _NEAR = 0.02
+_OTHER = {"left": "right", "right": "left"}
 
 
 def mirror_axis(figure: Figure) -> int:
@@ -97,19 +99,28 @@ def posing_partners(figure: Figure) -> Ints:
             joint_meanings(skeleton), sided_words(skeleton.names), strict=True
         )
     ]
-    counts = Counter(keys)
-    place = {key: joint for joint, key in enumerate(keys) if counts[key] == 1}
-    other = {"left": "right", "right": "left"}
-    partners = np.full(skeleton.n_joints, -1, dtype=np.int32)
-    for joint, (side, word) in enumerate(keys):
-        if side and (side, word) in place:
-            partners[joint] = place.get((other[side], word), -1)
+    partners = word_partners(keys)
+    is_own = partners == np.arange(skeleton.n_joints)
     joints, axis = rest_joints(figure), mirror_axis(figure)
-    pairs = np.flatnonzero(partners >= 0)
+    pairs = np.flatnonzero((partners >= 0) & ~is_own)
     plane = joints[pairs if len(pairs) else [0], axis].mean()
     near = np.abs(joints[:, axis] - plane) <= _NEAR * box_size(bounding_box(joints))
-    central = np.flatnonzero((partners < 0) & near & np.array([not side for side, _ in keys]))
-    partners[central] = central
+    partners[is_own & ~near] = -1
+    return partners
+
+
+def word_partners(words: Sequence[tuple[str, str]]) -> Ints:
+    """Return the joint of the other side with the same word (J,); itself without a side; or -1.
+
+    ``words``: side and word of each joint, as of ``sided_words``. Words that several joints of a
+    side have make no pairs.
+    """
+    counts, place = Counter(words), {word: joint for joint, word in enumerate(words)}
+    partners = np.arange(len(words), dtype=np.int32)
+    for joint, (side, word) in enumerate(words):
+        if side:
+            other = (_OTHER[side], word)
+            partners[joint] = place[other] if counts[other] == 1 == counts[side, word] else -1
     return partners
 
 
