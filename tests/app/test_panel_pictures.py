@@ -19,6 +19,7 @@ from viewer.app.files.files import Files
 from viewer.app.layout import Layout, ShownPanels
 from viewer.app.linting.lint_panel import Linting, check_rig
 from viewer.app.posing.posing import Posing
+from viewer.app.retargeting.drive_changes import toggle_hands
 from viewer.app.weights.weights_panel import pin_vertex
 from viewer.progress import report
 
@@ -206,6 +207,18 @@ def test_joint_match_panel_matches_its_golden_image(drive):
         hand.move("joint left_hip")
 
     _compare(_shown(hand, prepare), "joint_match")
+
+
+@pytest.mark.golden("app_actors")
+def test_actors_panel_of_a_driven_figure_matches_its_golden_image(drive):
+    hand = drive(scene=driven_scene(), size=BODY_SIZE, samples=4, pixels_per_point=1.0)
+    hand.state.of(ShownPanels).closed |= {"stats", "display", "skinning", "weights", "camera"}
+
+    def prepare(hand):
+        hand.state.of(Layout).fronts.append("Actors")
+        toggle_hands(hand.state)
+
+    _compare(_shown(hand, prepare), "actors")
 
 
 def _compare(pixels, name):

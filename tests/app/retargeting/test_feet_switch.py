@@ -1,4 +1,4 @@
-"""The switch for planted feet of driven figures in the Actors panel."""
+"""The switches for planted feet and hands at the body of driven figures in the Actors panel."""
 
 import threading
 import time
@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from rig.retargeting.hanging_arms import body, motion
 from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.two_people import BODY, figure_of
 from rig.retargeting.walking import RATE, walk
@@ -15,7 +16,13 @@ from viewer.app.core.reasons import no_undo
 from viewer.app.core.undo_actions import undo
 from viewer.app.files.files import Files, Stream, stream_captures
 from viewer.app.retargeting import drive_changes
-from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
+from viewer.app.retargeting.drive_changes import (
+    keeps_hands,
+    no_edit,
+    plants_feet,
+    toggle_feet,
+    toggle_hands,
+)
 from viewer.formats import Source, read
 from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder
@@ -64,9 +71,30 @@ def test_check_box_turns_planted_feet_off_and_undo_restores_them(walker):
     assert not plants_feet(hand.state) and hand.says("Feet: as retargeted")
 
 
-def test_figures_without_a_motion_of_another_skeleton_have_no_switch(hand):
-    toggle_feet(hand.state)
+def test_check_box_turns_hands_at_the_body_off_and_undo_restores_them(drive):
+    figure, motion_drive = body(width=1.5), Drive(motion(0.3, 0.2), plants_feet=False)
+    clip, _ = driven_clip(motion_drive, figure)
+    hand = drive(scene=Scene([Actor(figure, clip=clip, drive=motion_drive)]), size=(1000, 1000))
+    hand.show_panel("Actors")
+    hand.step(3)
+    actor, plain = hand.state.actor, retarget(motion_drive.motion, figure).clip
+    assert keeps_hands(hand.state) and np.abs(clip.rotations - plain.rotations).max() > 1e-3
+    hand.click("Hands at the body")
+    hand.step(2)
+    assert not keeps_hands(hand.state) and hand.says("Hands: as retargeted")
     assert not plants_feet(hand.state)
+    np.testing.assert_array_equal(actor.clip.rotations, plain.rotations)
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert actor.clip is clip and keeps_hands(hand.state)
+
+
+@pytest.mark.parametrize(
+    ("toggle", "is_on"), [(toggle_feet, plants_feet), (toggle_hands, keeps_hands)]
+)
+def test_figures_without_a_motion_of_another_skeleton_have_no_switch(hand, toggle, is_on):
+    toggle(hand.state)
+    assert not is_on(hand.state)
     assert hand.says("no motion of another skeleton drives this figure")
 
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from rig.retargeting.rest_twins import NAMES, PERSON, Y, Z, t_pose, worlds, written
-from rig.retargeting.two_people import figure_of, places
+from rig.retargeting.hanging_arms import N, body, motion
+from rig.retargeting.rest_twins import NAMES, Y, t_pose, worlds, written
+from rig.retargeting.two_people import places
 
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.mesh import Mesh
@@ -16,38 +17,9 @@ from viewer.rig.retargeting.driven_hands import keep_hands
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.skin import skin_from_lists
 
-N = 40
 ARM, ELBOW, HAND = ("LeftArm", "LeftForeArm", "LeftHand")
 # The height from ankles to neck: thigh 45, shin with the ankle 2 behind it, and pelvis to neck.
 HEIGHT = 45.0 + np.hypot(42.0, 2.0) + 50.0
-
-
-def body(arms: float = 1.0, width: float = 1.0, height: float = 1.0):
-    """Return a person with longer arms, wider shoulders and hips, scaled by a height."""
-    table = {name: (parent, np.array(place, float)) for name, (parent, place) in PERSON.items()}
-    for name, (parent, place) in table.items():
-        if name.endswith(("Arm", "ForeArm", "Hand", "Shoulder")):
-            sign = np.sign(place[0])
-            root = sign * 18.0
-            place[0] = root * width + arms * (place[0] - root) if abs(place[0]) > 18 else (
-                place[0] * width
-            )  # fmt: skip
-        if name.endswith(("UpLeg", "Leg", "Foot", "ToeBase")):
-            place[0] *= width
-        table[name] = (parent, height * place)
-    names = {name: f"{name}_" for name in table}
-    return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
-
-
-def motion(bend: float, swing: float):
-    """Return arms that hang down, elbows that bend in ``swing`` radians around ``bend``."""
-    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
-    phase = np.linspace(0.0, 2.0 * np.pi, N)
-    for side, sign in (("Left", 1.0), ("Right", -1.0)):
-        local[:, NAMES.index(f"{side}Arm")] = matrices(-sign * 1.5 * Z)
-        turns = -sign * Y * (bend + swing * np.sin(phase))[:, None]
-        local[:, NAMES.index(f"{side}ForeArm")] = matrices(turns)
-    return written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
 
 
 def kept(figure, source):
