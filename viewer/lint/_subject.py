@@ -92,6 +92,10 @@ class Subject:
         """Return which of ``count`` items of a part, a key of ``invalid``, are valid: (count,)."""
         return valid(self.invalid, part, count)
 
+    def lacks(self, *parts: str) -> bool:
+        """Return whether a reader replaced data of one of these parts, keys of ``invalid``."""
+        return any(len(self.invalid.get(part, ())) for part in parts)
+
     def length(self, length: float) -> str:
         """Return a length as text: in millimetres if the unit is known, else relative to size."""
         figure = self.actor.figure
@@ -287,7 +291,7 @@ def _track(subject: Subject) -> Track | None:
         numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
     scale = mean_scale(actor.placement)
-    is_bound = figure.is_attached and not len(subject.invalid.get("bindings", ()))
+    is_bound = figure.is_attached and not subject.lacks("bindings")
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))

@@ -40,7 +40,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None or figure.skeleton is None:
         return
-    if len(subject.invalid.get("weights", ())) or figure.mesh.n_triangles == 0:
+    if subject.lacks("weights") or figure.mesh.n_triangles == 0:
         return
     if figure.skin.n_joints != figure.skeleton.n_joints:
         return

@@ -69,7 +69,7 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
     clip = subject.actor.clip
-    if clip is None or clip.end <= clip.start or len(subject.invalid.get("joints", ())):
+    if clip is None or clip.end <= clip.start or subject.lacks("joints"):
         return None
     track = track_of(subject)
     return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None

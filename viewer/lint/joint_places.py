@@ -34,10 +34,10 @@ _BELOW = 0.05  # minimum depth of a head below the feet, relative to the size
 def check(subject: Subject) -> Iterator[Finding]:
     """Check the joints of an attached figure at the bind pose."""
     figure = subject.actor.figure
-    size, lost = subject.size(), subject.invalid
+    size = subject.size()
     if figure.skin is None or figure.mesh is None or not figure.is_attached or not size > 0.0:
         return
-    if any(len(lost.get(part, ())) for part in ("weights", "positions", "bindings", "joints")):
+    if subject.lacks("weights", "positions", "bindings", "joints"):
         return
     places = bind_positions(figure.skin)
     meanings = joint_meanings(figure.require_skeleton())

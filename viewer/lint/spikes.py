@@ -29,12 +29,12 @@ def check(subject: Subject) -> Iterator[Finding]:
     mesh = figure.mesh
     if mesh is None or mesh.n_vertices < FEWEST or mesh.n_triangles == 0 or not size > 0.0:
         return
-    if any(len(subject.invalid.get(part, ())) for part in ("positions", "triangles")):
+    if subject.lacks("positions", "triangles"):
         return
     surface = surface_of(figure)
     heights, edges = _heights(mesh.positions, surface)
     tall = heights > _EDGES * edges
-    if figure.is_attached and not len(subject.invalid.get("bindings", ())):
+    if figure.is_attached and not subject.lacks("bindings"):
         mirror = mirror_of(figure)
         if mirror is not None:
             tall |= _one_sided(mesh.positions, surface, mirror, heights, _HEIGHT * size)

@@ -45,10 +45,10 @@ _NEARER = 0.35  # maximum distance from the bones of the right joint, relative t
 def check(subject: Subject) -> Iterator[Finding]:
     """Compare where joints have weights with where they are."""
     figure = subject.actor.figure
-    size, lost = subject.size(), subject.invalid
+    size = subject.size()
     if figure.skin is None or figure.mesh is None or not figure.is_attached or not size > 0.0:
         return
-    if any(len(lost.get(part, ())) for part in ("weights", "positions", "bindings", "joints")):
+    if subject.lacks("weights", "positions", "bindings", "joints"):
         return  # places and weights that are missing cannot be compared
     found = support_of(figure)
     if figure.mesh.n_vertices < FEWEST or len(found.vertices) == 0:

@@ -43,7 +43,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     figure = subject.actor.figure
     if figure.skeleton is not None:
         yield from _limits(subject, figure.skeleton)
-    if figure.mesh is not None and figure.is_attached and not _is_incomplete(subject):
+    is_whole = not subject.lacks("positions", "weights", "bindings", "joints")
+    if figure.mesh is not None and figure.is_attached and is_whole:
         mirror = mirror_of(figure)
         if mirror is not None:
             yield from _joints(subject, figure, mirror)
@@ -128,11 +129,6 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
         np.concatenate([joints, partners[joints]]),
         np.concatenate([whole.weights, -whole.weights]),
     )
-
-
-def _is_incomplete(subject: Subject) -> bool:
-    parts = ("positions", "weights", "bindings", "joints")
-    return any(len(subject.invalid.get(part, ())) for part in parts)
 
 
 def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:

@@ -47,7 +47,7 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> Iterator[Finding]:
     idle = idle_joints(skin, figure.skeleton)
-    if len(idle) == 0 or len(subject.invalid.get("weights", ())):
+    if len(idle) == 0 or subject.lacks("weights"):
         return  # the missing weights may refer to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
@@ -81,7 +81,7 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> Iterator[Finding
     plain = merged(skin)
     used = np.bincount(owners(plain), plain.weights != 0.0, minlength=plain.n_vertices)
     used[~known] = 0.0
-    can_pose = figure.is_attached and not len(subject.invalid.get("joints", ()))
+    can_pose = figure.is_attached and not subject.lacks("joints")
     for message, limit in (
         ("W007.influences: {n} more than 4 influences (maximum: {most}){cost}", 4),
         ("W008.influences: {n} more than 8 influences (maximum: {most}){cost}", 8),
