@@ -16,7 +16,7 @@ HALF = np.sqrt(0.5)
 
 def square(**changes):
     parts = {"weights": WEIGHTS, "joints": JOINTS, "names": ("hip", "knee"), **changes}
-    return viewer.figure(SQUARE, [[0, 1, 2, 3]], **parts)
+    return viewer.figure(SQUARE, parts.pop("faces", [[0, 1, 2, 3]]), **parts)
 
 
 def influences(figure) -> list[list[tuple[int, float]]]:
@@ -131,6 +131,10 @@ def test_texture_and_coordinates_are_used():
         ({"weights": WEIGHTS[:3]}, r"weights: expected shape \(4, 2\), found \(3, 2\)"),
         ({"weights": csr_matrix(WEIGHTS[:3])}, r"weights: expected shape \(4, 2\), found \(3, 2\)"),
         ({"weights": (WEIGHTS, WEIGHTS[:1])}, r"expected indices and weights of shape \(4, K\)"),
+        ({"faces": [[0, 1, 4]]}, r"faces\[0, 2\]: expected 0 to 3, found 4"),
+        ({"faces": [[0, -1, 2]]}, r"faces\[0, 1\]: expected 0 to 3, found -1"),
+        ({"faces": [[0.0, 1.0, 2.0]]}, r"faces: expected integers of shape \(T, 3\) or \(Q, 4\)"),
+        ({"weights": ([[0], [0], [0], [2]], np.ones((4, 1)))}, "joints: expected indices 0 to 1"),
         ({"joints": None}, "weights: expected joints with them, found none"),
         ({"joints": [[0, 0, np.nan], [0, 1, 0]]}, r"joints\[0, 2\]: expected a finite number"),
         ({"parents": [-1, 1]}, r"parents\[1\]: expected -1 or an earlier joint, found 1"),

@@ -115,7 +115,7 @@ def figure(
     'figure'
     """
     positions = _numbers("vertices", vertices, (None, 3))
-    triangles = _triangles(faces)
+    triangles = _triangles(faces, len(positions))
     coordinates = None if uvs is None else _numbers("uvs", uvs, (len(positions), 2))
     pixels = None if texture is None else _pixels(texture)
     if pixels is not None and coordinates is None:
@@ -221,7 +221,7 @@ def _numbers(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Flo
     return found
 
 
-def _triangles(faces: ArrayLike) -> Ints:
+def _triangles(faces: ArrayLike, n_vertices: int) -> Ints:
     """Return triangles (T, 3); quadrilaterals are split along their first diagonal."""
     found = np.asarray(faces)
     if (
@@ -232,6 +232,12 @@ def _triangles(faces: ArrayLike) -> Ints:
         raise RigError(
             f"faces: expected integers of shape (T, 3) or (Q, 4), found {found.dtype} of shape "
             f"{found.shape}"
+        )
+    wrong = np.argwhere((found < 0) | (found >= n_vertices))
+    if len(wrong):
+        face, corner = wrong[0].tolist()
+        raise RigError(
+            f"faces[{face}, {corner}]: expected 0 to {n_vertices - 1}, found {found[face, corner]}"
         )
     if found.shape[1] == 4:
         found = np.concatenate([found[:, [0, 1, 2]], found[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
