@@ -117,6 +117,11 @@ class Part:
         return self.frames
 
     @property
+    def start(self) -> float:
+        """Time of the first frame on the scene's clock, seconds."""
+        return self.actor.offset + float(self.animation.frames.times[0])
+
+    @property
     def present(self) -> Bools:
         """Whether the actor is present in each frame; in its pose or parts, one value."""
         if isinstance(self.frames, SampledPoints):

@@ -256,9 +256,24 @@ def test_page_permits_only_its_own_scripts_and_escapes_names(tmp_path):
     assert "unsafe" not in policy and "http" not in policy
     assert "<title>&lt;b&gt;&amp;</title>" in text
     assert HOSTILE not in text and text.count("</script>") == 3
-    header = json.loads(re.search(r'id="header">(.*?)</script>', text, re.DOTALL)[1])
+    header = header_of(tmp_path / "<b>&.html")
     assert header["figures"][0]["name"] == HOSTILE
     assert not re.search(r"https?://", re.sub(r'id="data">.*?<', "", text))
+
+
+def header_of(path):
+    """Return the page's header, which states everything but the numbers."""
+    text = path.read_text("utf-8")
+    return json.loads(re.search(r'id="header">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def test_timeline_begins_with_the_motion_beside_a_still_figure(tmp_path):
+    actor, still = moving(tangle(n_joints=4, n_influences=2)), tangle(n_joints=3, n_influences=2)
+    late = Part(actor, None, sample_animation(actor, frames=(2, 5)))
+    beside = Part(Actor(still, figure_pose(still)))
+    export(Selection([late, beside]), tmp_path / "a.html")
+    motions = [each["motion"] for each in header_of(tmp_path / "a.html")["figures"]]
+    assert [(each["start"], each["n"]) for each in motions] == [(0.0, 3), (0.0, 1)]
 
 
 def test_notes_state_errors_of_the_written_numbers(tmp_path):

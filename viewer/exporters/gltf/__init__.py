@@ -35,7 +35,6 @@ from viewer.exporters.gltf.sampled import (
     sampled_losses,
     sampled_of,
     seconds_of,
-    start_of,
     written_part,
 )
 from viewer.formats import all_or_none, save_bytes
@@ -202,10 +201,10 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
         for each in parts
     ]
     # Figures keep their relative times; the earliest frame of all is at 0.
-    begin, name, index = min(map(start_of, parts)), common_name(parts, path.stem), -1
+    begin, name, index = min(each.start for each in parts), common_name(parts, path.stem), -1
     built = []
     for part, sampled in zip(parts, found, strict=True):
-        delay = start_of(part) - begin
+        delay = part.start - begin
         made, index = add_sampled(document, sampled, options, None, delay, name, index)
         built.append(made)
     together, how = Clips(document), options.skinning
@@ -217,7 +216,7 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
     placing = place_figures(document, actors, built, to_file)
     lenses = _add_cameras(document, scene.views, to_file, [*zip(actors, built, strict=True)])
     (data,) = _files([(path, document)])
-    seconds = max(start_of(each) + seconds_of(each.animation) for each in parts) - begin
+    seconds = max(each.start + seconds_of(each.animation) for each in parts) - begin
     cameras = [Phrase("{n}", n=counted(len(scene.views), "camera"))] if scene.views else []
     values = {
         "n_figures": counted(len(actors), "figure"),

@@ -45,11 +45,6 @@ class Sampled:
     """Linear colour of surfaces without a colour; None for the default."""
 
 
-def start_of(part: Part) -> float:
-    """Return the time of a part's first frame on the scene's clock, seconds."""
-    return part.actor.offset + float(part.animation.frames.times[0])
-
-
 def seconds_of(animation: SampledAnimation) -> float:
     """Return the time from the first to the last frame."""
     return (animation.frames.n_frames - 1) / animation.frame_rate

@@ -64,7 +64,7 @@ _ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fi
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write figures in their poses or with their frames, placed as in their scene."""
     notes, packer, shown = list[Diagnostic](), Packer(), list[_Shown]()
-    first = min(map(_start_of, selection.parts))
+    first = min((each.start for each in selection.parts if each.frames is not None), default=0.0)
     for number, part in enumerate(selection.parts):
         report(number, len(selection.parts), "figures")
         one, found = _shown(part, options, first)
@@ -209,11 +209,6 @@ def _unpacked_vertices(
     return model[3] * moved + model[:3]
 
 
-def _start_of(part: Part) -> float:
-    """Return the time of a part's first frame on the scene's clock, seconds."""
-    return 0.0 if part.frames is None else part.actor.offset + float(part.animation.frames.times[0])
-
-
 def _shown(part: Part, options: ExportOptions, first: float) -> tuple[_Shown, list[Diagnostic]]:
     """Return a part as it is shown, and notes about gaps; the page begins at ``first``."""
     for what, value in (("unit", options.unit), ("up axis", options.up)):
@@ -222,8 +217,7 @@ def _shown(part: Part, options: ExportOptions, first: float) -> tuple[_Shown, li
     actor = part.actor
     if part.frames is None:
         still = tracks_of(actor.figure, [actor.pose], options.skinning)
-        start = 0.0
-        return _Shown(actor, [actor.pose], np.ones(1, np.bool_), 1.0, start, still), []
+        return _Shown(actor, [actor.pose], np.ones(1, np.bool_), 1.0, 0.0, still), []
     animation = part.animation
     if options.gaps == "split":
         raise RigError('gaps of pages: expected hold or interpolate, found "split"')
@@ -231,10 +225,9 @@ def _shown(part: Part, options: ExportOptions, first: float) -> tuple[_Shown, li
     frames = filled(kept, interpolate=False)
     poses = [pose_of(animation.figure, frames, frame) for frame in range(frames.n_frames)]
     tracks = tracks_of(animation.figure, poses, options.skinning)
-    start = _start_of(part) - first
     timing = animation.motion.timing
     holds = timing is None or timing.holds
-    rate = animation.frame_rate
+    rate, start = animation.frame_rate, part.start - first
     return _Shown(actor, [*poses], kept.present, rate, start, tracks, holds), notes
 
 
