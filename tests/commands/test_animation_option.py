@@ -68,7 +68,7 @@ def test_conversion_writes_the_requested_animation(capsys, box, tmp_path):
     assert run(["diff", box, copy, "--animation", "Rise", "--tolerance", "1e-6"]) == 0
 
 
-@pytest.mark.parametrize("output", ["out.bvh", "out.npz", "out_{frame}.obj"])
+@pytest.mark.parametrize("output", ["out.bvh", "out.npz", "out_{frame}.obj", "out.html"])
 def test_conversion_to_frames_names_the_animations_that_are_not_written(
     capsys, box, tmp_path, output
 ):

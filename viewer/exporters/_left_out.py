@@ -1,8 +1,9 @@
-"""Parts of figures that formats cannot store."""
+"""Parts of figures that formats cannot store, and notes of figures that share a file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.evaluation import Frames, JointMotion
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import is_regular
+from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton
 
 _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
@@ -92,3 +94,10 @@ def motion_notes(animation: SampledAnimation) -> list[Diagnostic]:
     if animation.frames.n_frames == 1:
         return []
     return rate_note(animation) + other_animations_note(animation.figure, animation.motion)
+
+
+def of_figure(actor: Actor, remark: Diagnostic) -> Diagnostic:
+    """Return a note that names the figure that it is about, for files with several figures."""
+    values = {"figure": actor.name, "remark": replace(remark, path=None)}
+    sentence = f"{remark.code}.of-figure: {{figure}}: {{remark}}"
+    return Diagnostic(sentence, remark.path, values=values)

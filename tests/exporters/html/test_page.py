@@ -285,6 +285,23 @@ def test_notes_state_errors_of_the_written_numbers(tmp_path):
     assert 0.0 < percent <= 100.0 * EXACT
 
 
+def test_notes_name_the_figure_and_the_missing_frames(tmp_path):
+    figure = tangle(n_joints=4, n_influences=2)
+    first, second = moving(figure), moving(replace(figure, name="b"), missing=(1, 3), seed=3)
+    animations = [sample_animation(each, frames=(1, 5)) for each in (first, second)]
+    pairs = zip((first, second), animations, strict=True)
+    found = export(
+        Selection([Part(actor, None, each) for actor, each in pairs]), tmp_path / "a.html"
+    )
+    notes = [str(each) for each in found]
+    assert "b: frames 1, 3 missing, as in the original motion" in notes, notes
+    assert sum("vertices differ" in each for each in notes) == 2
+    numbers = [
+        int(re.search(r"frame (\d)", each)[1]) for each in notes if "vertices differ" in each
+    ]
+    assert numbers[1] in (2, 4), numbers  # as in the motion, where b is present
+
+
 def test_units_and_axes_of_pages_are_those_of_the_scene(tmp_path):
     actor = moving(tangle(n_joints=4, n_influences=2))
     part = Part(actor, None, sample_animation(actor))

@@ -17,7 +17,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.exporters._exporter import Part, Selection
 from viewer.exporters._gaps import frames_phrase
-from viewer.exporters._left_out import motion_notes, other_animations_note, rate_note
+from viewer.exporters._left_out import motion_notes, of_figure, other_animations_note, rate_note
 from viewer.exporters._losses.motion_errors import resampling_losses
 from viewer.exporters._motion_paths import split_paths
 from viewer.exporters._options import ExportOptions
@@ -108,7 +108,7 @@ def write_poses(
     for actor, each in zip(actors, added, strict=True):
         own_notes = _figure_notes(path, actor, each, file, skinning, extend is not None)
         several = len(actors) > 1
-        notes += [_of_figure(actor, note) for note in own_notes] if several else own_notes
+        notes += [of_figure(actor, note) for note in own_notes] if several else own_notes
     return notes + lenses
 
 
@@ -145,11 +145,6 @@ def _written(
             "their": agree(len(animations), "its", "their"),
         },
     )
-
-
-def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
-    values = {"figure": actor.name, "remark": replace(note, path=None)}
-    return Diagnostic(f"{note.code}.of-figure: {{figure}}: {{remark}}", note.path, values=values)
 
 
 def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagnostic]:
@@ -242,9 +237,9 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
         own += resampling_losses(path, sampled.animation, how) + rate_note(sampled.animation)
         own += not_held(sampled.animation.figure, sampled.body.shape)
         own += other_animations_note(part.animation.figure, part.animation.motion)
-        notes += [_of_figure(part.actor, note) for note in own]
+        notes += [of_figure(part.actor, note) for note in own]
     for actor, each in zip(others, added, strict=True):
-        notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]
+        notes += [of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]
     return notes + lenses
 
 

@@ -15,7 +15,7 @@ import hashlib
 import html
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,8 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RenderError, RigError
 from viewer.exporters._exporter import Part, Selection
-from viewer.exporters._gaps import filled, kept_gaps
+from viewer.exporters._gaps import filled, kept_gaps, kept_note
+from viewer.exporters._left_out import motion_notes, of_figure
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
 from viewer.exporters.html.figures import pack_mesh, pack_skin, plain
@@ -63,13 +64,11 @@ _ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fi
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write figures in their poses or with their frames, placed as in their scene."""
-    notes, packer, shown = list[Diagnostic](), Packer(), list[_Shown]()
+    packer, shown = Packer(), list[_Shown]()
     first = min((each.start for each in selection.parts if each.frames is not None), default=0.0)
     for number, part in enumerate(selection.parts):
         report(number, len(selection.parts), "figures")
-        one, found = _shown(part, options, first)
-        shown.append(one)
-        notes += found
+        shown.append(_shown(part, options, first))
     how, texts = options.skinning, list[str]()
     packed = [each.pack(how, packer, texts) for each in shown]
     scene = selection.scene or Scene(selection.actors)
@@ -88,8 +87,10 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     page = _page(header, data, poster, _description(shown))
     save_text(path, page)
     arrays = unpacked(packer.items, data)
+    notes = list[Diagnostic]()
     for one, (figure, center) in zip(shown, packed, strict=True):
-        notes += one.losses(path, figure, center, arrays, how)
+        own = one.notes + one.losses(path, figure, center, arrays, how)
+        notes += own if len(shown) == 1 else [of_figure(one.actor, each) for each in own]
     seconds = max(each.start + (len(each.poses) - 1) / each.rate for each in shown)
     values = {
         "figures": listed([each.actor.name for each in shown]),
@@ -115,6 +116,10 @@ class _Shown:
     tracks: Tracks
     holds: bool = True
     """Whether the figure is present before its first and after its last frame."""
+    first_frame: int | None = None
+    """Number of the first frame; None for a pose."""
+    notes: list[Diagnostic] = field(default_factory=list)
+    """What the page leaves out of the motion."""
 
     @property
     def seen(self) -> list[int]:
@@ -174,7 +179,7 @@ class _Shown:
             if "mesh" in packed:
                 vertices = _unpacked_vertices(packed, center, arrays, frame, self.tracks, how)
             losses.look(self.poses[frame], vertices, frame=frame)
-        return losses.notes(path, 0 if len(self.poses) > 1 else None)
+        return losses.notes(path, self.first_frame)
 
 
 def _unpacked_vertices(
@@ -209,26 +214,28 @@ def _unpacked_vertices(
     return model[3] * moved + model[:3]
 
 
-def _shown(part: Part, options: ExportOptions, first: float) -> tuple[_Shown, list[Diagnostic]]:
-    """Return a part as it is shown, and notes about gaps; the page begins at ``first``."""
+def _shown(part: Part, options: ExportOptions, first: float) -> _Shown:
+    """Return a part as it is shown; the page begins at ``first``."""
     for what, value in (("unit", options.unit), ("up axis", options.up)):
         if value:
             raise RigError(f"{what} of pages: expected none, as the scene is shown, found {value}")
     actor = part.actor
     if part.frames is None:
         still = tracks_of(actor.figure, [actor.pose], options.skinning)
-        return _Shown(actor, [actor.pose], np.ones(1, np.bool_), 1.0, 0.0, still), []
+        return _Shown(actor, [actor.pose], np.ones(1, np.bool_), 1.0, 0.0, still)
     animation = part.animation
     if options.gaps == "split":
         raise RigError('gaps of pages: expected hold or interpolate, found "split"')
-    kept, notes = kept_gaps(animation.frames, options.gaps, animation.first_frame)
+    number = animation.first_frame
+    kept, notes = kept_gaps(animation.frames, options.gaps, number)
     frames = filled(kept, interpolate=False)
     poses = [pose_of(animation.figure, frames, frame) for frame in range(frames.n_frames)]
     tracks = tracks_of(animation.figure, poses, options.skinning)
     timing = animation.motion.timing
     holds = timing is None or timing.holds
     rate, start = animation.frame_rate, part.start - first
-    return _Shown(actor, [*poses], kept.present, rate, start, tracks, holds), notes
+    notes = [*notes, *kept_note(kept.present, number), *motion_notes(animation)]
+    return _Shown(actor, [*poses], kept.present, rate, start, tracks, holds, number, notes)
 
 
 def _stage(scene: Scene, points: Floats) -> Json:
