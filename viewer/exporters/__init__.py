@@ -167,6 +167,7 @@ EXPORTERS = {
         _BOTH,
         stores_many=True,
         keeps_gaps=True,
+        omits_hidden=True,
     ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
@@ -246,9 +247,9 @@ def export(
             part = each.parts[0]
             with raising():  # sampling and comparing may take long; saving holds signals itself
                 notes += module.export(each, file, replace(chosen, world_up=part.up))
-            if part.frames is None:
-                notes += _hidden_note(each.actors)
-            elif part.content == "frames" and not plan.kind.stores_many:
+            if part.frames is None or plan.kind.omits_hidden:
+                notes += _hidden_note(each.actors, plan.kind)
+            if part.content == "frames" and not plan.kind.stores_many:
                 notes += motion_notes(part.animation)
     return notes + _untracked_note(plan) + plan.omitted
 
@@ -412,7 +413,12 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
     ]
 
 
-def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
+def _hidden_note(actors: Sequence[Actor], kind: Exporter) -> list[Diagnostic]:
     count = sum(len(actor.hidden_parts) for actor in actors)
     n = counted(count, "hidden part", "is", "are")
-    return [note("X005.hidden-parts: {n} also written", n=n)] if count else []
+    key = (
+        "X003.hidden-parts: {n} not written"
+        if kind.omits_hidden
+        else "X005.hidden-parts: {n} also written"
+    )
+    return [note(key, n=n)] if count else []

@@ -62,6 +62,8 @@ class Exporter:
     """Whether each frame of a motion has its own file."""
     keeps_gaps: bool = False
     """Whether frames of a motion may be missing; other motions are split at gaps on request."""
+    omits_hidden: bool = False
+    """Whether hidden parts of a mesh are left out; other formats contain them."""
     keeps_world: bool = False
     """Whether it keeps the up axis of the motion's own world, even if that world is upside down."""
 

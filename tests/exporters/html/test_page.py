@@ -302,6 +302,21 @@ def test_notes_name_the_figure_and_the_missing_frames(tmp_path):
     assert numbers[1] in (2, 4), numbers  # as in the motion, where b is present
 
 
+@pytest.mark.parametrize("moves", [False, True])
+def test_hidden_parts_are_left_out_and_reported(tmp_path, moves):
+    actor = moving(tangle(n_joints=4, n_influences=2))
+    mesh = actor.figure.mesh
+    parts = np.arange(mesh.n_triangles, dtype=np.int32) % 3
+    mesh = replace(mesh, parts=("a", "b", "c"), triangle_parts=parts)
+    actor.figure, actor.hidden_parts = replace(actor.figure, mesh=mesh), frozenset({1})
+    part = Part(actor, None, sample_animation(actor) if moves else None)
+    notes = export(Selection([part]), tmp_path / "a.html")
+    said = [str(each) for each in notes if each.key == "X003.hidden-parts"]
+    assert said == ["1 hidden part is not written"]
+    (figure,) = header_of(tmp_path / "a.html")["figures"]
+    assert figure["mesh"]["runs"] == [[-1, 0, 3 * int((parts != 1).sum())]]
+
+
 def test_units_and_axes_of_pages_are_those_of_the_scene(tmp_path):
     actor = moving(tangle(n_joints=4, n_influences=2))
     part = Part(actor, None, sample_animation(actor))
