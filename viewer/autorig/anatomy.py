@@ -138,7 +138,7 @@ class Paths:
     """Shortest paths through the middle of a solid."""
 
     def __init__(self, solid: Solid) -> None:
-        self.solid = solid
+        self.steps: csr_array = solid.graph()
         self.radii = solid.radii()
         # Close to the surface, the radius is known to half a voxel only.
         wide = np.maximum(self.radii / solid.spacing, 0.5)
@@ -175,7 +175,8 @@ def anatomy_of(
     lateral, offset, symmetry = _sagittal_plane(solid, up, lateral)
     centers = solid.centers(solid.voxels)
     sides = centers @ lateral - offset
-    steps = solid.graph()
+    paths = Paths(solid)
+    steps = paths.steps
     middle = _middle(steps, np.abs(sides) <= 1.01 * solid.spacing)
     distances, _, sources = csgraph.dijkstra(
         steps, indices=middle, min_only=True, return_predecessors=True
@@ -185,7 +186,6 @@ def anatomy_of(
     tips = _tips(steps, np.where(np.isfinite(distances), distances, 0.0), solid.spacing)
     tips = tips[distances[tips] >= _PROMINENT * size]
     report_fraction(0.8, "anatomy")
-    paths = Paths(solid)
     limbs = [
         Limb(
             centers[path],
@@ -536,8 +536,7 @@ def _end_path(anatomy: Anatomy, start: int, other: int) -> Ints:
     from scipy.sparse import csgraph
 
     solid = anatomy.solid
-    steps = solid.graph()
-    own, others = csgraph.dijkstra(steps, indices=[start, other])
+    own, others = csgraph.dijkstra(anatomy.paths.steps, indices=[start, other])
     sides = solid.centers(solid.voxels) @ anatomy.lateral - anatomy.offset
     beyond = (others >= own + 0.5 * others[start]) & (np.abs(sides) <= 1.01 * solid.spacing)
     beyond &= np.isfinite(own)

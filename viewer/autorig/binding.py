@@ -23,7 +23,6 @@ from viewer.autorig.weights.bone_weights import (
     BoneWeights,
     bone_heat,
     bones_in,
-    gaps,
     geodesic_voxels,
     names_control,
 )
@@ -296,7 +295,7 @@ def _slid(solid: Solid, points: Floats, place: Similarity) -> Similarity:
 def _counts_inside(solid: Solid, points: Floats, places: list[Similarity]) -> list[int]:
     """Return how many of the points are inside with each of the maps."""
     moved = np.concatenate([place.apply(points) for place in places])
-    inside = gaps(solid, moved) <= NEAR * solid.spacing
+    inside = solid.gaps(moved) <= NEAR * solid.spacing
     return [int(row.sum()) for row in inside.reshape(len(places), len(points))]
 
 

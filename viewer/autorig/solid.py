@@ -23,6 +23,7 @@ from viewer.rig.geometry.topology import part_volumes
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
+    from scipy.spatial import cKDTree
 
 RESOLUTION = 96
 """Default number of voxels along the longest side of the mesh's box."""
@@ -54,6 +55,8 @@ class Solid:
     """(N, 3). Grid coordinates of the voxels of the solid."""
     numbers: Ints
     """(X, Y, Z). Row of each voxel in ``voxels``, -1 outside."""
+    tree: cKDTree
+    """Search tree of the centres of ``voxels``."""
 
     def centers(self, voxels: Ints) -> Floats:
         """Return the centres of voxels (..., 3)."""
@@ -66,10 +69,11 @@ class Solid:
 
     def nearest(self, points: Floats) -> Ints:
         """Return the row in ``voxels`` of the nearest voxel of the solid: (N,)."""
-        from scipy import spatial
+        return np.asarray(self.tree.query(points)[1], dtype=np.int32)
 
-        found = spatial.cKDTree(self.centers(self.voxels)).query(points)[1]
-        return np.asarray(found, dtype=np.int32)
+    def gaps(self, points: Floats) -> Floats:
+        """Return the distances of points (N, 3) from the nearest voxels' centres: (N,)."""
+        return np.asarray(self.tree.query(points)[0])
 
     def radii(self) -> Floats:
         """Return the distances of ``voxels`` from the surface: (N,)."""
@@ -103,7 +107,7 @@ class Solid:
 
 def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -> Solid:
     """Return the voxels inside a mesh; ``RigError`` if it encloses none."""
-    from scipy import ndimage
+    from scipy import ndimage, spatial
 
     used = positions[triangles.ravel()]
     low, high = used.min(axis=0), used.max(axis=0)
@@ -129,7 +133,8 @@ def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -
     voxels = np.argwhere(inside).astype(np.int32)
     numbers = np.full(shape, -1, dtype=np.int32)
     numbers[inside] = np.arange(len(voxels))
-    return Solid(origin, spacing, inside, distance, voxels, numbers)
+    tree = spatial.cKDTree(origin + spacing * voxels)
+    return Solid(origin, spacing, inside, distance, voxels, numbers, tree)
 
 
 def _outward(positions: Floats, triangles: Ints) -> Floats:

@@ -112,7 +112,7 @@ def bones_in(
     count, space = skeleton.n_joints, solid.spacing
     drawn = np.zeros(count, dtype=np.bool_)
     drawn[shown_joints(skeleton)] = True
-    is_near = gaps(solid, positions) <= NEAR * space
+    is_near = solid.gaps(positions) <= NEAR * space
     controlling = _controls(skeleton, positions, is_near, _SAME * space)
     if holders is not None:
         controlling |= holders
@@ -139,7 +139,7 @@ def bones_in(
             lines.append(_line(positions[joint], end, _STEP * space))
             owners.append(np.full(len(lines[-1]), joint, dtype=np.int32))
     points, owner = np.concatenate(lines), np.concatenate(owners)
-    kept = gaps(solid, points) <= NEAR * space
+    kept = solid.gaps(points) <= NEAR * space
     counts = np.bincount(owner[kept], minlength=count)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return Bones(points[kept], starts, plays & ~is_near & (parents >= 0))
@@ -212,12 +212,6 @@ def _line(start: Floats, end: Floats, step: float) -> Floats:
     return start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
 
 
-def gaps(solid: Solid, points: Floats) -> Floats:
-    """Return the distances of points (N, 3) from the nearest voxels' centres: (N,)."""
-    centers = solid.centers(solid.voxels[solid.nearest(points)])
-    return np.asarray(np.linalg.norm(points - centers, axis=1))
-
-
 def _contains(solid: Solid, points: Floats) -> Bools:
     """Return whether points (N, 3) lie in voxels of the solid: (N,)."""
     # The border of the grid is outside, so points beyond it are, too.
@@ -271,7 +265,7 @@ def geodesic_voxels(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
     joints, graph = bones.joints.tolist(), solid.graph()
     rows, places = solid.nearest(mesh.positions), solid.nearest(bones.points)
     # From the surface to the first voxel, the path is straight.
-    first = np.linalg.norm(mesh.positions - solid.centers(solid.voxels[rows]), axis=1)
+    first = solid.gaps(mesh.positions)
     lengths = np.empty((len(rows), len(joints)))
     for column, joint in enumerate(joints):
         report(column, len(joints), "", "measuring paths")
@@ -364,8 +358,7 @@ def _nearest_through(solid: Solid, bones: Bones, points: Floats) -> tuple[Ints, 
     )
     at = solid.nearest(points)
     owners = bones.owners[first][np.searchsorted(sources, origins[at])]
-    first_step = np.linalg.norm(points - solid.centers(solid.voxels[at]), axis=1)
-    return owners, lengths[at] + first_step
+    return owners, lengths[at] + solid.gaps(points)
 
 
 def _unit_rows(rows: csr_array, where: NDArray[np.integer], joints: Ints) -> csr_array:
