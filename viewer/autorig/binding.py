@@ -15,7 +15,7 @@ from viewer.autorig.checks import check_lines, residual_of, with_joint_name
 from viewer.autorig.rigged import Rigged, with_fields
 from viewer.autorig.settings import TransferSettings
 from viewer.autorig.solid import Solid, solid_of
-from viewer.autorig.surface.welding import Welded, weld
+from viewer.autorig.surface.welding import Welded, one_sided, weld
 from viewer.autorig.transfer.rest_skeleton import scaled_pose, with_offsets
 from viewer.autorig.weights.bone_weights import (
     NEAR,
@@ -70,7 +70,7 @@ _ROUNDING = 1e-9
 def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
     """Bind a mesh to the posed skeleton of a figure; see ``transfer``, which checks the mesh."""
     report_fraction(0.0, "voxels")
-    mesh = _one_sided(weld(target.positions, target.triangles))
+    mesh = one_sided(weld(target.positions, target.triangles))
     with part_of_work(span=(0.0, 0.2)):
         solid = solid_of(mesh.positions, mesh.triangles)
     skeleton = shaped_skeleton(source, pose.shape_weights)
@@ -145,15 +145,6 @@ def _turned_back(mesh: Mesh, rotation: Floats) -> Mesh:
         return mesh
     # v' = R^-1 v: the vectors are rows, so they are multiplied by R.
     return replace(mesh, positions=mesh.positions @ rotation, normals=mesh.normals @ rotation)
-
-
-def _one_sided(mesh: Welded) -> Welded:
-    """Return a mesh without the second sides of triangles that are there twice.
-
-    Both sides together enclose nothing, and edges of four triangles have no Laplace operator.
-    """
-    first = np.unique(np.sort(mesh.triangles, axis=1), axis=0, return_index=True)[1]
-    return replace(mesh, triangles=mesh.triangles[np.sort(first)])
 
 
 def _deforming(source: Figure) -> Bools | None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.autorig.surface.samples import sample_surface
-from viewer.autorig.surface.welding import weld
+from viewer.autorig.surface.welding import one_sided, weld
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import report_fraction
@@ -138,8 +138,8 @@ def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -
 
 
 def _outward(positions: Floats, triangles: Ints) -> Floats:
-    """Return the corners (T, 3, 3) of triangles, with parts that are inside out reversed."""
-    mesh = weld(positions, triangles)
+    """Return one-sided triangles (T, 3, 3), with parts that are inside out reversed."""
+    mesh = one_sided(weld(positions, triangles))
     if len(mesh.triangles) == 0:
         raise RigError("expected a mesh with an area, found none")
     corners = mesh.positions[mesh.triangles]

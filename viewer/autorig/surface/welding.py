@@ -6,6 +6,8 @@ these as borders, or the mesh would tear there.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -59,6 +61,15 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
         vertices=vertices,
         islands=islands(len(first), kept),
     )
+
+
+def one_sided(mesh: Welded) -> Welded:
+    """Return a mesh without the second sides of triangles that are there twice.
+
+    Both sides together enclose nothing, and edges of four triangles have no Laplace operator.
+    """
+    first = np.unique(np.sort(mesh.triangles, axis=1), axis=0, return_index=True)[1]
+    return replace(mesh, triangles=mesh.triangles[np.sort(first)])
 
 
 def islands(n_vertices: int, triangles: Ints) -> Ints:
