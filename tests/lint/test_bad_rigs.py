@@ -365,3 +365,5 @@ def test_wrist_in_the_chest_is_found(frames, expected):
     numbers = [number for one in found for number in one.frames.tolist()]
     # Between the samples before and after, the wrist passes the skin.
     assert set(expected) <= set(numbers) <= {19, *expected, 30}
+    again = [*hands.check(Subject(actor, invalid={"normals": np.arange(3)}))]
+    assert [one.message for one in again] == [one.message for one in found]

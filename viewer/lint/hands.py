@@ -73,7 +73,9 @@ def check(subject: Subject) -> Iterator[Finding]:
     track = track_of(subject)
     if track is None or figure.mesh is None or figure.skin is None or not figure.is_attached:
         return
-    if figure.mesh.n_vertices < FEWEST or subject.invalid:
+    if subject.lacks("weights", "positions", "bindings", "joints"):
+        return
+    if figure.mesh.n_vertices < FEWEST:
         return
     trunk = _trunks.get(figure, (), lambda: _trunk(figure))
     if trunk is None:
