@@ -154,6 +154,17 @@ def test_sound_motion_has_no_finding(change, is_captured):
     assert linted(change, is_captured) == []
 
 
+@pytest.mark.parametrize("gap", [1, 15])
+def test_quick_swing_around_missing_frames_is_not_jitter(gap):
+    """4.1 swings a second of up to 40 degrees, around another bend after the gap than before."""
+    rows = np.arange(90)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (90, 6, 1))
+    turns[:, 3] = about_z(40.0 * np.sin(2.0 * np.pi * 4.1 * rows / RATE) + 120.0 * (rows > 44))
+    rows[45 : 45 + gap] = -1
+    actor = Actor(arm(), clip=SampledClip("x", Timing(RATE, rows), turns))
+    assert "C014.rotation" not in [one.diagnostic.key for one in jitter.check(Subject(actor))]
+
+
 def test_teleport_in_a_clip_of_keys_is_a_jump():
     """The pelvis of legs, below a root that stays, is 0.2 m aside from frame 30 on."""
     from viewer.lint import clips

@@ -84,7 +84,8 @@ def _rotations(subject: Subject) -> Iterator[Finding]:
     usual = float(np.median(np.concatenate([most, np.zeros(skeleton.n_joints - len(most))])))
     limit = max(_ANGLE, _ALONE * usual)
     columns = np.flatnonzero(most > limit)
-    is_white = [_correlation(turns[:, moves[column]]) < _WHITE for column in columns]
+    runs = runs_of(track.present[rows])
+    is_white = [_correlation(turns[:, moves[column]], runs) < _WHITE for column in columns]
     columns = columns[is_white]
     if len(columns) == 0:
         return
@@ -109,13 +110,19 @@ def _rotations(subject: Subject) -> Iterator[Finding]:
     )
 
 
-def _correlation(values: Floats) -> float:
-    """Return the correlation of successive fourth differences of values (F, C)."""
+def _correlation(values: Floats, runs: list[tuple[int, int]]) -> float:
+    """Return the correlation of successive fourth differences of values (F, C) within runs."""
     # For independent errors, sum_i c_i c_i+1 / sum_i c_i^2 = -56 / 70 = -0.8; for a swing of w
     # radians per frame, cos w, which is positive unless it takes less than four frames.
+    parts = [_fourth(values[first:stop]) for first, stop in runs if stop - first > 4]
+    products = sum(float((part[1:] * part[:-1]).sum()) for part in parts)
+    return products / max(sum(float((part * part).sum()) for part in parts), 1e-300)
+
+
+def _fourth(values: Floats) -> Floats:
+    """Return the fourth differences of values (F, ...): (F - 4, ...)."""
     count = len(values) - 4
-    fourth = np.array([c * values[k : k + count] for k, c in enumerate(_STENCIL)]).sum(axis=0)
-    return float((fourth[1:] * fourth[:-1]).sum() / max((fourth * fourth).sum(), 1e-300))
+    return np.asarray(sum(c * values[k : k + count] for k, c in enumerate(_STENCIL.tolist())))
 
 
 def _points(subject: Subject, clip: PointClip) -> Iterator[Finding]:
@@ -181,10 +188,7 @@ def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
             end = min(start + _TOGETHER + width + 4, stop)
             if end - start < width + 4:
                 continue
-            part = positions[start:end]
-            count = end - start - 4
-            fourth = sum(c * part[k : k + count] for k, c in enumerate(_STENCIL.tolist()))
-            lengths = np.linalg.norm(np.asarray(fourth), axis=-1)
+            lengths = np.linalg.norm(_fourth(positions[start:end]), axis=-1)
             # A step or a jump makes up to five large differences per window. A low quantile of the
             # window does not see them; the mean would.
             windows = np.lib.stride_tricks.sliding_window_view(lengths, width, axis=0)
