@@ -25,6 +25,20 @@ def test_arrays_are_rounded_to_steps():
     assert (np.abs(scaled - second).max(axis=0) <= [0.5001e-6, 0.5001]).all()
 
 
+def test_equal_arrays_and_files_are_stored_once():
+    packer, rows = Packer(), np.random.default_rng(4).normal(size=(40, 3))
+    found = [packer.add(rows, 1e-3), packer.add_file(b"\x89PNG", "image/png")]
+    size = len(packer.text())
+    assert [packer.add(rows + 0.0, 1e-3), packer.add_file(b"\x89PNG", "image/png")] == found
+    assert len(packer.text()) == size
+    other = [packer.add(rows, 2e-3), packer.add(rows.reshape(20, 6), 1e-3)]
+    other.append(packer.add_file(b"\x89PNG", "image/jpeg"))
+    assert other == [2, 3, 4]
+    first, _, coarse, wide, _ = read_back(packer)
+    assert_array_equal(wide.shape, (20, 6))
+    assert not np.array_equal(first, coarse)
+
+
 @pytest.mark.parametrize("values", [[], [0], [-1], [2**29, -(2**29), 0], [5] * 9, range(-4, 300)])
 def test_integers_are_exact(values):
     packer = Packer()

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import zlib
 
 import numpy as np
@@ -19,12 +20,13 @@ _MOST_DIFFERENCES = 2  # speeds of smooth motions change little, so their second
 
 
 class Packer:
-    """Collects arrays and files; each is referred to by its index in ``items``."""
+    """Collects arrays and files, equal ones once; each is referred to by its index in ``items``."""
 
     def __init__(self) -> None:
         self.items: list[Json] = []
         self._parts: list[bytes] = []
         self._size = 0
+        self._known: dict[tuple[str, bytes], int] = {}
 
     def add(self, values: ArrayLike, step: ArrayLike = 1.0) -> int:
         """Add an array (N,) or (N, C), rounded to multiples of ``step``, one or (C,)."""
@@ -57,10 +59,14 @@ class Packer:
         return self._append({"type": kind, "size": len(data)}, data)
 
     def _append(self, item: Json, data: bytes) -> int:
-        self.items.append({**item, "at": self._size})
-        self._parts.append(data)
-        self._size += len(data)
-        return len(self.items) - 1
+        # People in a capture are often the same body, and materials share images.
+        key = json.dumps(item), data
+        if key not in self._known:
+            self._known[key] = len(self.items)
+            self.items.append({**item, "at": self._size})
+            self._parts.append(data)
+            self._size += len(data)
+        return self._known[key]
 
     def text(self) -> str:
         """Return all bytes, deflated, in base64."""
