@@ -232,6 +232,43 @@ def test_controls_play_orbit_and_show_weights(browser, tmp_path):
 
 
 @needs_chromium
+def test_an_image_is_written_once_and_sampled_as_each_material_asks(browser, tmp_path):
+    plain, image = tangle(n_joints=4, n_influences=2), np.full((4, 4, 4), 200, dtype=np.uint8)
+    looks = [
+        {"wrap": ("repeat", "clamp")},
+        {"wrap": ("repeat", "clamp"), "minification": "linear"},
+        {"wrap": ("clamp", "clamp"), "is_smooth": False},
+        {"wrap": ("repeat", "clamp")},
+    ]
+    textures = [viewer.rig.material.Texture("a.png", image, **look) for look in looks]
+    mesh = replace(
+        plain.mesh,
+        uvs=np.random.default_rng(3).random((90, 2)),
+        materials=tuple(viewer.rig.material.Material(base_texture=each) for each in textures),
+        triangle_materials=np.arange(plain.mesh.n_triangles, dtype=np.int32) % len(looks),
+    )
+    write(tmp_path / "a.html", moving(replace(plain, mesh=mesh)))
+    pictures = [each for each in header_of(tmp_path / "a.html")["items"] if "type" in each]
+    assert len(pictures) == 1
+    browser.open(tmp_path / "a.html")
+    filters = browser.run(
+        "viewer.ready.then(({ gl, figures: [figure] }) => figure.surfaces.map((surface) => {"
+        " gl.bindTexture(gl.TEXTURE_2D, surface.textures[0].texture);"
+        " return ['MIN_FILTER', 'MAG_FILTER', 'WRAP_S', 'WRAP_T'].map((name) =>"
+        " gl.getTexParameter(gl.TEXTURE_2D, gl['TEXTURE_' + name])); }))"
+    )
+    mipmapped, linear, sharp, nearest = 0x2703, 0x2601, 0x2702, 0x2600
+    repeat, clamp = 0x2901, 0x812F
+    assert filters == [
+        [mipmapped, linear, repeat, clamp],
+        [linear, linear, repeat, clamp],
+        [sharp, nearest, clamp, clamp],
+        [mipmapped, linear, repeat, clamp],
+    ]
+    assert browser.messages == []
+
+
+@needs_chromium
 def test_picture_matches_the_desktop(browser, tmp_path):
     """The same fox from the same camera: only edges and the contact shadow differ."""
     assert run(["convert", "-o", str(tmp_path / "fox.html")]) == 0

@@ -111,7 +111,7 @@ class NumberTexture {
 }
 
 // A mip-mapped texture of a picture; larger ones than the driver takes are reduced.
-function pictureTexture(gl, bitmap, { isLinear, repeats, isSmooth }) {
+function pictureTexture(gl, bitmap, { isLinear, repeats, isSmooth, minification }) {
   const limit = gl.getParameter(gl.MAX_TEXTURE_SIZE), texture = gl.createTexture();
   let source = bitmap;
   if (Math.max(bitmap.width, bitmap.height) > limit) {
@@ -124,8 +124,8 @@ function pictureTexture(gl, bitmap, { isLinear, repeats, isSmooth }) {
   gl.generateMipmap(gl.TEXTURE_2D);
   [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T].forEach((side, axis) =>
     gl.texParameteri(gl.TEXTURE_2D, side, repeats[axis] ? gl.REPEAT : gl.CLAMP_TO_EDGE));
-  const small = isSmooth ? gl.LINEAR_MIPMAP_LINEAR : gl.NEAREST_MIPMAP_LINEAR;
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, small);
+  const usual = isSmooth ? "linear_mipmap_linear" : "nearest_mipmap_linear";
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl[(minification || usual).toUpperCase()]);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, isSmooth ? gl.LINEAR : gl.NEAREST);
   return texture;
 }

@@ -54,12 +54,13 @@ class Figure {
       this.attributes.in_other_uvs = [bufferOf(gl, both), 4];
     }
     if ("tints" in mesh) this.attributes.in_tint = [floats(this.split(get("tints"), 4)), 4];
-    const images = new Map();
+    // Materials may sample the same image in different ways.
+    const made = new Map();
     this.surfaces = mesh.surfaces.map((surface) => ({ ...surface,
-      textures: surface.textures.map((one) => {
-        if (!images.has(one.image))
-          images.set(one.image, pictureTexture(gl, this.arrays[one.image], one));
-        return { unit: one.unit, texture: images.get(one.image) };
+      textures: surface.textures.map(({ unit, ...how }) => {
+        const key = JSON.stringify(how);
+        if (!made.has(key)) made.set(key, pictureTexture(gl, this.arrays[how.image], how));
+        return { unit, texture: made.get(key) };
       }) }));
     const macros = mesh.hasMaterials ? "-MATERIALS" : "";
     this.surface = this.programs.get(`mesh${macros}`);

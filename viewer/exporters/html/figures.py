@@ -122,7 +122,7 @@ def _pack_surfaces(
         }
         textures = []
         for name, texture in slots.items():
-            key = id(texture.image), texture.wrap
+            key = id(texture.image), *(side == "mirror" for side in texture.wrap)
             if key not in images:
                 images[key] = packer.add_file(*_picture(texture))
             textures.append(
@@ -132,6 +132,7 @@ def _pack_surfaces(
                     "isLinear": name != "base_texture",
                     "repeats": [side != "clamp" for side in texture.wrap],
                     "isSmooth": texture.is_smooth,
+                    "minification": texture.minification,
                 }
             )
         uniforms = surface_uniforms(material, slots, sets)
