@@ -27,7 +27,7 @@ from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import align_signs, multiply
 from viewer.rig.geometry.transform import apply_transform, mean_scale
 from viewer.rig.geometry.vectors import Up, axis_vector
 from viewer.rig.hierarchy import path_to_root
@@ -239,6 +239,12 @@ class Track:
     def on_frames(self) -> Indices:
         """Return the rows at the frames of the file: (N,)."""
         return np.arange(0, len(self.times), self.per_frame)
+
+    def turns(self, rows: Indices) -> Floats:
+        """Return the rotations of rows without changes of sign between them: (N, J, 4)."""
+        turns = self.rotations[rows]
+        align_signs(turns)
+        return turns
 
     def of_each(self, rows: Indices) -> Indices:
         """Return rows, keeping only the first of each frame: (N,)."""

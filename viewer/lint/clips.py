@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -175,11 +175,17 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
 
 def _leaps(speeds: Floats, carriers: Ints) -> Floats:
     """Return speeds (F - 1, J) of carriers much slower two steps before and after; else 0."""
-    around = np.pad(speeds, ((2, 2), (0, 0)))
-    count, is_carrier = len(speeds), np.zeros(speeds.shape[1], dtype=np.bool_)
+    is_carrier = np.zeros(speeds.shape[1], dtype=np.bool_)
     is_carrier[carriers] = True
-    others = np.max([around[k : k + count] for k in (0, 1, 3, 4)], axis=0)
+    others = largest_around(speeds, (-2, -1, 1, 2))
     return np.where((others < _SLOWLY * speeds) & is_carrier, speeds, 0.0)
+
+
+def largest_around(values: Floats, shifts: Sequence[int]) -> Floats:
+    """Return the largest of the values (F, N) some rows away from each row, 0 outside: (F, N)."""
+    most, count = max(map(abs, shifts)), len(values)
+    padded = np.pad(values, ((most, most), (0, 0)))
+    return np.max([padded[most + k : most + k + count] for k in shifts], axis=0)
 
 
 def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:

@@ -12,7 +12,6 @@ from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip, visible_size
 from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.skeleton import joint_labels
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
@@ -69,8 +68,7 @@ def _rotations(subject: Subject) -> Iterator[Finding]:
     if len(rows) < 2:
         return
     rate = 1.0 / float(track.times[rows[1]] - track.times[rows[0]])
-    turns = track.rotations[rows].copy()
-    align_signs(turns)
+    turns = track.turns(rows)
     moves = np.flatnonzero((turns != turns[0]).any(axis=(0, 2)))
     if rate < _SLOWEST * (1.0 - _ON_RATE) or len(moves) == 0:
         return

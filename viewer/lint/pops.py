@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject, Track, track_of, travelling_joints
+from viewer.lint.clips import largest_around
 from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.inspection.faults import distinct
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -39,10 +39,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     rows = track.on_frames()
     if len(rows) < 2 * _AROUND:
         return
-    turns = track.rotations[rows].copy()
-    align_signs(turns)
     # Close to each other, unit quaternions are half the angle of their rotation apart.
-    found = _pops(track, rows, 2.0 * turns, np.arange(skeleton.n_joints), _ANGLE)
+    found = _pops(track, rows, 2.0 * track.turns(rows), np.arange(skeleton.n_joints), _ANGLE)
     if found is not None:
         yield _finding(
             subject,
@@ -117,10 +115,10 @@ def _pops(
     known = _known(track, rows)[1:-1, joints[columns]]
     size = np.where(known, np.linalg.norm(off, axis=2), 0.0)
     count, steps = len(size), np.linalg.norm(np.diff(values, axis=0), axis=2)
-    others = _around(size, count, [*range(-_AROUND, -1), *range(2, _AROUND + 1)])
+    others = largest_around(size, [*range(-_AROUND, -1), *range(2, _AROUND + 1)])
     # Two steps lead to each frame and away from it; those before and after are the usual ones.
-    before = _around(steps[:-1], count, range(-_NEAR, 0))
-    after = _around(steps[1:], count, range(1, _NEAR + 1))
+    before = largest_around(steps[:-1], range(-_NEAR, 0))
+    after = largest_around(steps[1:], range(1, _NEAR + 1))
     usual = np.maximum(before, after)
     across = 0.5 * np.linalg.norm(values[2:] - values[:-2], axis=2)
     is_pop = (size > least) & (size > _RETURNS * across) & (size > _OTHERS * others)
@@ -137,13 +135,6 @@ def _pops(
     frames, places = frames[order], places[order]
     found = np.asarray(joints, dtype=np.int64)[columns[places]]
     return _Pops(float(size[frames[0], places[0]]), rows[frames + 1], found)
-
-
-def _around(values: Floats, count: int, shifts: Sequence[int]) -> Floats:
-    """Return the largest of the values (F, N) some rows away from each row: (F, N)."""
-    most = max(map(abs, shifts))
-    padded = np.pad(values, ((most, most), (0, 0)))
-    return np.max([padded[most + k : most + k + count] for k in shifts], axis=0)
 
 
 def _known(track: Track, rows: Indices) -> Bools:
