@@ -354,6 +354,25 @@ def test_hidden_parts_are_left_out_and_reported(tmp_path, moves):
     assert figure["mesh"]["runs"] == [[-1, 0, 3 * int((parts != 1).sum())]]
 
 
+@pytest.mark.parametrize(
+    ("look", "said"),
+    [
+        ({}, []),
+        ({"shade_color": (0.1, 0.1, 0.1), "is_physical": True}, ["toon", "steps and outlines"]),
+        ({"unlit": True, "is_physical": True}, ["unlit", "lighting"]),
+        ({"is_physical": True}, ["metallic-roughness", "Blinn-Phong"]),
+    ],
+)
+def test_surfaces_that_look_different_are_reported(tmp_path, look, said):
+    plain = tangle(n_joints=4, n_influences=2)
+    material = viewer.rig.material.Material(**look)
+    shown = np.zeros(plain.mesh.n_triangles, dtype=np.int32)
+    mesh = replace(plain.mesh, materials=(material,), triangle_materials=shown)
+    _, notes = write(tmp_path / "a.html", moving(replace(plain, mesh=mesh)))
+    found = [each for each in notes if "surfaces are shown" in each]
+    assert len(found) == bool(said) and all(word in found[0] for word in said)
+
+
 def test_units_and_axes_of_pages_are_those_of_the_scene(tmp_path):
     actor = moving(tangle(n_joints=4, n_influences=2))
     part = Part(actor, None, sample_animation(actor))

@@ -165,8 +165,6 @@ class _Shown:
             if figure.is_attached:
                 packed["skin"] = pack_skin(rest.require_skin(), how, packer)
                 packed["skin"]["isAffine"] = "stretches" in packed["motion"]
-        if any(material.is_physical for material in (figure.mesh.materials if figure.mesh else ())):
-            notes.append("metallic-roughness surfaces are shown with Blinn-Phong shading")
         return packed, center
 
     def losses(

@@ -58,6 +58,7 @@ def pack_mesh(
     starts = [0, *edges.tolist()] if len(order) else []
     ends = [*edges.tolist(), len(order)]
     sets = drawn_sets(mesh, notes)
+    notes += _changed_looks(mesh)
     has_uvs = mesh.uvs is not None and len(mesh.uvs) > 0
     packed: Json = {
         "center": center.tolist(),
@@ -79,6 +80,21 @@ def pack_mesh(
     if mesh.colors is not None:
         packed["tints"] = packer.add(mesh.colors, _COLOR_STEP)
     return packed, center
+
+
+def _changed_looks(mesh: Mesh) -> list[str]:
+    """Return sentences about the surfaces that look different from those of the desktop."""
+    materials = mesh.materials
+    is_toon = [each.shade_color is not None for each in materials]
+    others = [each for each, toon in zip(materials, is_toon, strict=True) if not toon]
+    changes = {
+        "toon surfaces are shown without their steps and outlines": any(is_toon),
+        "unlit surfaces are shown with lighting": any(each.unlit for each in others),
+        "metallic-roughness surfaces are shown with Blinn-Phong shading": any(
+            each.is_physical and not each.unlit for each in others
+        ),
+    }
+    return [sentence for sentence, is_seen in changes.items() if is_seen]
 
 
 def _rows(mesh: Mesh, number: int) -> Floats:
