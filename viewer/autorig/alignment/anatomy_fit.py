@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.orientation_search import axis_direction
+from viewer.autorig.alignment.orientation_search import axis_direction, stated_front
 from viewer.autorig.alignment.pose_fit import (
     Fitted,
     Marks,
@@ -36,9 +36,11 @@ from viewer.data_classes import dataclass
 from viewer.progress import report_fraction
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.front import clear_front
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skin import owners, skin_from_entries, weight_sums
 from viewer.rig.skinning.lbs import blended_matrices
 
@@ -88,10 +90,8 @@ class Start:
 def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody | None:
     """Return the anatomy of a posed template; None if it lacks two pairs of limbs."""
     mesh = figure.require_mesh()
-    up = axis_direction(figure.up)
-    # A figure faces +z if y is up, and +x if z is up.
-    front = axis_direction("z" if figure.up == "y" else "x")
-    left = np.cross(up, front)
+    up, left = axis_direction(figure.up), left_of(figure, pose)
+    front = np.cross(left, up)
     anatomy = anatomy_of(positions, mesh.triangles, up, left)
     standing = [pair for pair in anatomy.pairs[:2] if anatomy.stands(pair)]
     is_quadruped = len(standing) == 2
@@ -100,6 +100,13 @@ def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody
         return None
     points = body_points(anatomy, plans[0], is_quadruped)
     return TemplateBody(figure, pose, anatomy, points, is_quadruped, left)
+
+
+def left_of(figure: Figure, pose: Pose) -> Floats:
+    """Return the unit vector to the left of a posed template: (3,)."""
+    # Figures of VRM 0 face -z, those of Blender -y; their joints' names say so.
+    front = clear_front(Scene([Actor(figure, pose)], world_up=figure.up))
+    return np.cross(axis_direction(figure.up), axis_direction(front or stated_front(figure.up)))
 
 
 def starts_of(body: TemplateBody, target: Anatomy, front: Floats | None) -> list[Start]:

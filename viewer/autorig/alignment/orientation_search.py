@@ -48,20 +48,24 @@ def axis_direction(name: str) -> Floats:
     return direction
 
 
+def stated_front(template_up: str) -> str:
+    """Return the axis that counts as the front of a template: +z if y is up, +x if z is up."""
+    return "z" if template_up == "y" else "x"
+
+
 def axis_rotations(
     template_up: str, up: str | None = None, facing: str | None = None
 ) -> list[Floats]:
     """Return the rotations (3, 3) that map axes to axes: 24, 4 or 1, the least angle first.
 
-    The template's up axis is mapped to ``up``, its front, +z if y is up and +x if z is up, to
-    ``facing``.
+    The template's up axis is mapped to ``up``, its ``stated_front`` to ``facing``.
     """
     for name in filter(None, (up, facing)):
         if name not in AXES:
             raise RigError(f'expected an axis, one of {", ".join(AXES)}, found "{name}"')
     if up is not None and facing is not None and up[-1] == facing[-1]:
         raise RigError(f"expected a facing perpendicular to the up axis {up}, found {facing}")
-    forward = "z" if template_up == "y" else "x"
+    forward = stated_front(template_up)
     rotations = []
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         matrix = np.zeros((3, 3))

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.anatomy_fit import Start, starts_of, template_body
+from viewer.autorig.alignment.anatomy_fit import Start, left_of, starts_of, template_body
 from viewer.autorig.alignment.icp import Cloud, Triangles, iterate
 from viewer.autorig.alignment.orientation_search import axis_direction
 from viewer.autorig.alignment.pose_fit import Fitted, fit_pose, start_of
@@ -206,14 +206,10 @@ def _facing(job: _Job, ours: Posed, rigid: Alignment, starts: list[Start]) -> Al
     if rigid.how not in _FOUND or rigid.away > PART or not starts:
         return rigid
     # Columns of the rotations: the template's left and the starts' left in the target.
-    left = rigid.similarity.rotation @ np.cross(*_up_and_front(job.template.up))
+    left = rigid.similarity.rotation @ left_of(job.template, job.pose)
     if all(float(left @ start.plan.left) < 0.0 for start in starts):
         return _facing_back(job, ours, rigid, job.template.up)
     return rigid
-
-
-def _up_and_front(up: Up) -> tuple[Floats, Floats]:
-    return axis_direction(up), axis_direction("z" if up == "y" else "x")
 
 
 def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:

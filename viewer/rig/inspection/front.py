@@ -70,20 +70,25 @@ def guess_front(scene: Scene) -> Front:
     direction of its motion, or by the shape of its feet if it has neither joints nor captured
     points. The votes of actors that face opposite directions cancel out.
     """
+    return clear_front(scene) or usual_front(scene.up)
+
+
+def clear_front(scene: Scene) -> Front | None:
+    """Return the front for which there is clear evidence; None without it."""
     up = axis_vector(scene.up)
     drawn = [actor for actor in scene.actors if actor.is_drawn][:_MOST_ACTORS]
     votes = [vote for actor in drawn if (vote := _vote(actor, up)).any()]
     return _nearest(sum(votes, np.zeros(3)) / max(len(votes), 1), scene.up)
 
 
-def _nearest(vote: Floats, up: Up) -> Front:
-    """Return the axis closest to a vote; the default one if none is close."""
+def _nearest(vote: Floats, up: Up) -> Front | None:
+    """Return the axis closest to a vote; None if none is close."""
     fronts = front_axes(up)
     signs = [1.0 if front[0] == "+" else -1.0 for front in fronts]
     axes = ["xyz".index(front[1]) for front in fronts]
     components = vote[axes] * signs
     best = int(np.argmax(components))
-    return fronts[best] if components[best] >= _SURE else usual_front(up)
+    return fronts[best] if components[best] >= _SURE else None
 
 
 def _vote(actor: Actor, up: Floats) -> Floats:

@@ -1,0 +1,48 @@
+"""Starts from anatomy, for templates that face any way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from viewer.autorig.alignment.anatomy_fit import left_of, starts_of, template_body
+from viewer.autorig.anatomy import anatomy_of
+from viewer.loading import bundled_body, load
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import Mesh
+from viewer.rig.pose import rest_pose
+from viewer.rig.skin import owners, skin_from_entries
+
+# The body's x, y, z, where its left is +x and its front +z, in a template.
+ROTATIONS = {
+    "y": np.diag([-1.0, 1.0, -1.0]),  # front -z, as in VRM 0
+    "z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),  # front -y, as in Blender
+}
+
+
+def rotated(figure, rotation, up):
+    offsets = figure.skeleton.rest_translations @ rotation.T
+    skeleton = replace(figure.skeleton, rest_translations=offsets)
+    pose = rest_pose(skeleton)
+    skin = figure.skin
+    inverse = np.linalg.inv(world_matrices(skeleton, pose))
+    skin = skin_from_entries(skin.n_vertices, owners(skin), skin.joints, skin.weights, inverse)
+    mesh = figure.mesh
+    turned = Mesh(mesh.positions @ rotation.T, mesh.normals @ rotation.T, mesh.triangles)
+    return Figure("turned", turned, skeleton, skin, up=up), pose
+
+
+@pytest.mark.parametrize("up", ROTATIONS)
+def test_template_that_faces_another_way_is_turned_to_the_target(up):
+    figure = load(bundled_body()).actors[0].figure
+    rotation = ROTATIONS[up]
+    template, pose = rotated(figure, rotation, up)
+    assert_allclose(left_of(template, pose), rotation[:, 0])
+    body = template_body(template, pose, template.mesh.positions)
+    target = anatomy_of(figure.mesh.positions, figure.mesh.triangles, np.array([0.0, 1.0, 0.0]))
+    best = starts_of(body, target, None)[0]
+    assert best.is_sure
+    assert_allclose(best.fitted.similarity.rotation, rotation.T, atol=0.1)
+    assert best.error < 0.01
