@@ -57,6 +57,16 @@ def test_hands_beside_the_thighs_stay_there_in_a_figure_with_wide_shoulders():
         assert_allclose(*lengths, atol=1e-9)
 
 
+def test_size_and_place_of_the_whole_person_in_each_frame_change_nothing():
+    source, figure = motion(0.3, 0.2), body(width=1.5)
+    _, wanted, _ = kept(figure, source)
+    sizes, way = np.linspace(1.0, 2.0, N), np.linspace(0.0, 1e6, 3 * N).reshape(N, 3)
+    moved = replace(source.clip, figure_scales=sizes, figure_translations=way)
+    _, clip, changes = kept(figure, replace(source, clip=moved))
+    assert changes is not None
+    assert_allclose(clip.rotations, wanted.rotations, atol=1e-9)
+
+
 @pytest.mark.parametrize("height", [1.0, 0.02, 3.0])
 def test_figure_with_the_proportions_of_the_source_is_unchanged(height):
     found, clip, changes = kept(body(height=height), motion(0.3, 0.2))

@@ -71,7 +71,9 @@ class _Body:
         self.rests, self.chains = rests, chains_to(skeleton, joints.values())
         self.place = {name: int(self.chains.place[joint]) for name, joint in joints.items()}
         self.rest = rest_worlds(skeleton, self.chains, rests)
-        self.world = chain_worlds(clip, self.chains, *rests)
+        # A scale or place of the whole figure changes nothing between the parts of its body.
+        own = replace(clip, figure_scales=None, figure_translations=None)
+        self.world = chain_worlds(own, self.chains, *rests)
         top = next(name for name in _TOPS if name in joints)
         pelvis, neck, *leg = (self.rest[self.place[name], :3, 3] for name in ("pelvis", top, *_LEG))
         limb = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()
