@@ -136,3 +136,12 @@ def test_hands_can_be_left_as_retargeted_and_are_reported():
     assert not [note for note in notes if note.key == "F007.hands-kept"]
     plain = retarget(drive.motion, figure, source_rest="auto").clip
     assert_allclose(clip.rotations, plain.rotations, atol=1e-12)
+
+
+def test_hands_that_only_come_near_the_body_are_reported_with_their_distance():
+    # No wrist is within the distance that counts as touching, but some are moved.
+    figure, source = body(width=1.5), motion(0.8, 0.02)
+    theirs = from_thigh(places(source.figure, source.clip), suffix="")
+    assert np.linalg.norm(theirs, axis=1).min() > 0.14 * HEIGHT
+    _, _, changes = kept(figure, source)
+    assert 0.025 < changes.after < changes.before < 0.06

@@ -16,7 +16,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import Remedy
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import in_frame_order
 from viewer.rig.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds
 from viewer.rig.feet.legs import Leg, leg_rotations
@@ -55,11 +55,11 @@ _GIRTH = 75.0  # percentile of the distances of the skin from a bone that is tak
 
 @dataclass(frozen=True, slots=True)
 class KeptHands:
-    """How far hands are from where they should be, in frames in which they touch the body."""
+    """How far hands are from where they should be."""
 
     before: float
     after: float
-    """Mean distances, relative to the height from ankles to neck."""
+    """Mean distances, relative to the height from ankles to neck, weighted by nearness."""
 
 
 class _Body:
@@ -115,8 +115,8 @@ def keep_hands(
     if not can_move:
         return given, None
     radii = _radii(figure, mine, body.height)
-    shifts, touches, together = _shifts(body, other, found.to_target, radii)
-    before = _error(shifts, touches)
+    shifts, nearness, together = _shifts(body, other, found.to_target, radii)
+    before = _error(shifts, nearness)
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
     shifts = [
@@ -137,7 +137,7 @@ def keep_hands(
     kept = replace(clip, rotations=rotations)
     reached = _Body(skeleton, kept, mine, rests)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    return kept, KeptHands(before, _error(wished, touches))
+    return kept, KeptHands(before, _error(wished, nearness))
 
 
 def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
@@ -146,8 +146,9 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
         return []
     return [
         note(
-            "F007.hands-kept: hands of {figure} at its body where those of {motion} are: they miss "
-            "by {after:.1f} % of its height instead of {before:.1f} %; {remedy} disables this",
+            "F007.hands-kept: hands of {figure} kept at its body where those of {motion} are at "
+            "theirs: they miss by {after:.1f} % of the height from ankles to neck instead of "
+            "{before:.1f} %; {remedy} disables this",
             figure=figure.name,
             motion=found.source.figure.name,
             after=100.0 * kept.after,
@@ -159,12 +160,12 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
 
 def _shifts(
     body: _Body, other: _Body, to_target: Floats, radii: dict[str, float]
-) -> tuple[list[Floats], list[Bools], Floats]:
-    """Return how far the wrists should move, (N, 3) each, and in which rows they touch, (N,).
+) -> tuple[list[Floats], list[Floats], Floats]:
+    """Return how far the wrists should move, (N, 3) each, and how near they are to the body, (N,).
 
-    The last item is 1 in rows in which they touch each other, 0 in which they are apart: (N,).
+    The last item is how near they are to each other, (N,). 1: they touch, 0: they are far.
     """
-    shifts, touches = [], []
+    shifts, nearness = [], []
     for arm in _ARMS:
         wrist, own = other.at(arm[2]) @ to_target.T, body.at(arm[2])
         total, weights = np.zeros_like(own), np.zeros(len(own))
@@ -187,14 +188,14 @@ def _shifts(
             weights += weight**2
             most = np.maximum(most, weight)
         shifts.append((most / np.maximum(weights, 1e-30))[:, None] * total)
-        touches.append(most >= 1.0)
+        nearness.append(most)
     # Hands that touch each other move by half of the difference each.
     ends = [body.at(arm[2]) + shift for arm, shift in zip(_ARMS, shifts, strict=True)]
     between = (other.at(_ARMS[1][2]) - other.at(_ARMS[0][2])) @ to_target.T
     weight = _falloff(np.linalg.norm(between, axis=1), _TOGETHER, _APART)
     half = 0.5 * weight[:, None] * (between - (ends[1] - ends[0]))
     shifts = [shifts[0] - half, shifts[1] + half]
-    return shifts, [touch | (weight >= 1.0) for touch in touches], weight
+    return shifts, [np.maximum(near, weight) for near in nearness], weight
 
 
 def _bones(body: _Body) -> Iterator[tuple[str, str]]:
@@ -225,11 +226,11 @@ def _within_reach(body: _Body, arm: tuple[str, ...], shift: Floats) -> Floats:
     return np.where(is_far, shoulder + away * (most / distance)[:, None] - wrist, shift)
 
 
-def _error(shifts: list[Floats], touches: list[Bools]) -> float:
-    """Return the mean length of shifts in rows in which the hands touch; 0 if there are none."""
-    lengths = [np.linalg.norm(a, axis=1)[b] for a, b in zip(shifts, touches, strict=True)]
-    every = np.concatenate(lengths)
-    return float(every.mean()) if len(every) else 0.0
+def _error(shifts: list[Floats], nearness: list[Floats]) -> float:
+    """Return the mean distance from where hands should be, weighted by nearness."""
+    # The shifts contain the weights.
+    lengths = np.linalg.norm(np.concatenate(shifts), axis=1)
+    return float(lengths.sum() / max(np.concatenate(nearness).sum(), 1e-30))
 
 
 def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, float]:
