@@ -100,9 +100,9 @@ def keep_hands(
     if not needed <= mine.keys() or mine.keys().isdisjoint(_TOPS) or not clip.n_rows:
         return clip, None
     given, clip = clip, in_frame_order(clip)
-    weights = figure_pose(figure).shape_weights if clip.shape_weights is None else (
-        clip.shape_weights[0]
-    )  # fmt: skip
+    weights = figure_pose(figure).shape_weights
+    if clip.shape_weights is not None:
+        weights = clip.shape_weights[0]
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     body = _Body(skeleton, clip, mine, rests)
     theirs = {name: partners[joint] for name, joint in mine.items()}
@@ -125,10 +125,8 @@ def keep_hands(
     ]
     if not any(shift.any() for shift in shifts):
         return given, None
-    joints, arms = (
-        body.chains.joints,
-        [Leg(*(body.place[n] for n in (*arm, arm[2]))) for arm in _ARMS],
-    )
+    joints = body.chains.joints
+    arms = [Leg(*(body.place[name] for name in (*arm, arm[2]))) for arm in _ARMS]
     rotations = clip.rotations.copy()
     rotations[:, joints] = leg_rotations(
         rotations[:, joints], body.world, body.chains.parents, arms,
@@ -170,7 +168,7 @@ def _shifts(
         wrist, own = other.at(arm[2]) @ to_target.T, body.at(arm[2])
         total, weights = np.zeros_like(own), np.zeros(len(own))
         most = np.zeros(len(own))
-        for start, end in _bones(body):
+        for start, end in _bones(body.place):
             first, last = (other.at(name) @ to_target.T for name in (start, end))
             # The nearest point a + t (b - a) of the bone.
             bone = last - first
@@ -198,9 +196,9 @@ def _shifts(
     return shifts, [np.maximum(near, weight) for near in nearness], weight
 
 
-def _bones(body: _Body) -> Iterator[tuple[str, str]]:
+def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
     for part in _PARTS:
-        yield from pairwise([name for name in part if name in body.place])
+        yield from pairwise([name for name in part if name in joints])
 
 
 def _falloff(distance: Floats, near: float, far: float) -> Floats:
@@ -242,14 +240,13 @@ def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, f
     order = np.lexsort((skin.weights, vertices))
     strongest = order[np.flatnonzero(np.diff(vertices[order], append=-1))]
     points, result = rest_joints(figure), {}
-    for part in _PARTS:
-        for start, end in pairwise([name for name in part if name in joints]):
-            own = vertices[strongest[skin.joints[strongest] == joints[start]]]
-            bone = points[joints[end]] - points[joints[start]]
-            length = float(np.linalg.norm(bone))
-            if not len(own) or length <= 0.0:
-                continue
-            away = mesh.positions[own] - points[joints[start]]
-            across = np.linalg.norm(np.cross(away, bone / length), axis=1)
-            result[start] = float(np.percentile(across, _GIRTH)) / height
+    for start, end in _bones(joints):
+        own = vertices[strongest[skin.joints[strongest] == joints[start]]]
+        bone = points[joints[end]] - points[joints[start]]
+        length = float(np.linalg.norm(bone))
+        if not len(own) or length <= 0.0:
+            continue
+        away = mesh.positions[own] - points[joints[start]]
+        across = np.linalg.norm(np.cross(away, bone / length), axis=1)
+        result[start] = float(np.percentile(across, _GIRTH)) / height
     return result
