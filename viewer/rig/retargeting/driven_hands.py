@@ -25,7 +25,7 @@ from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.scene import figure_pose
-from viewer.rig.shape import rest_joints
+from viewer.rig.shape import rest_joints, shaped
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import owners
 
@@ -114,7 +114,7 @@ def keep_hands(
     )
     if not can_move:
         return given, None
-    radii = _radii(figure, mine, body.height)
+    radii = _radii(shaped(figure, weights), mine, body.height)
     shifts, nearness, together = _shifts(body, other, found.to_target, radii)
     before = _error(shifts, nearness)
     # The distances that are left to two hands add up.
