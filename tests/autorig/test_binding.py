@@ -11,6 +11,7 @@ from scipy import sparse
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import BINDING, TransferSettings
+from viewer.autorig.weights.bone_weights import names_control
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
@@ -161,6 +162,12 @@ def test_roots_on_the_ground_and_controls_get_no_weights():
     assert line == (
         "3 joints bound; no bone in the mesh, so no weights: Root, IK-middle, PoleTarget"
     )
+
+
+@pytest.mark.parametrize("name", ["左足ＩＫ", "rig:IK_foot.L", "mchSpine", "PoleTarget.001"])
+def test_names_of_controls_are_known_in_any_script_and_namespace(name):
+    skeleton = ball_skeleton(("左足", name), np.array([-1, 0], dtype=np.int32), np.eye(3)[:2])
+    assert names_control(skeleton).tolist() == [False, True]
 
 
 def test_joint_named_like_a_control_without_a_counterpart_is_bound():

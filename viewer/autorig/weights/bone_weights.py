@@ -7,7 +7,6 @@ through the solid (Dionne and de Lasa 2013), which needs no connected surface.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from viewer.errors import RigError
 from viewer.progress import part_of_work, report, report_fraction
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.vectors import unit
+from viewer.rig.retargeting.joint_names import name_tokens
 from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def bones_in(
 
 def names_control(skeleton: Skeleton) -> Bools:
     """Return the joints (J,) whose names say that they control others, such as an IK target."""
-    return np.array([bool(_CONTROLS & set(_words(name))) for name in skeleton.names])
+    return np.array([bool(_CONTROLS & set(name_tokens(name))) for name in skeleton.names])
 
 
 def _controls(skeleton: Skeleton, positions: Floats, is_inside: Bools, near: float) -> Bools:
@@ -174,12 +174,6 @@ def _controls(skeleton: Skeleton, positions: Floats, is_inside: Bools, near: flo
     copies = np.unique(top[result & (apart <= near)])
     useful = np.unique(top[result & is_inside])
     return result & (np.isin(top, copies) | ~np.isin(top, useful))
-
-
-def _words(name: str) -> list[str]:
-    """Return the words of a name in lower case: "control-footRoll.L" has control, foot, roll, l."""
-    found = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
-    return [word.lower() for word in found]
 
 
 def _tip(solid: Solid, skeleton: Skeleton, worlds: Floats, parents: Ints, joint: int) -> Floats:

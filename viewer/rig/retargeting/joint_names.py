@@ -337,7 +337,7 @@ def _limb_words(present: set[str]) -> tuple[dict[str, str], set[str]]:
 
 def _keys(names: Sequence[str]) -> list[_Key]:
     """Return side and word of every name, without the first and last words that most names have."""
-    split = [_tokens(name) for name in _unnumbered(names)]
+    split = [name_tokens(name) for name in _unnumbered(names)]
     for end in (0, -1):
         while True:
             ends = Counter(tokens[end] for tokens in split if tokens)
@@ -359,7 +359,7 @@ def _unnumbered(names: Sequence[str]) -> list[str]:
     return [name if each is None else each[1] for name, each in zip(names, found, strict=True)]
 
 
-def _tokens(name: str) -> list[str]:
+def name_tokens(name: str) -> list[str]:
     """Split a name, without its namespace, at capitals, digits and symbols; lower case."""
     bare = re.split(r"[:|/]", unicodedata.normalize("NFKC", _decoded(name)))[-1]
     tokens = [token.lower() for token in _TOKEN.findall(bare)]
