@@ -9,6 +9,7 @@ import numpy as np
 from viewer.diagnostics.codes import Severity
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
+from viewer.lint._surface import surface_of
 from viewer.phrases import agree, counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import (
@@ -18,7 +19,6 @@ from viewer.rig.geometry.topology import (
     edges_of,
     orientations,
     part_volumes,
-    welded,
 )
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.inspection.faults import stray_vertices
@@ -44,7 +44,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     flat = flat_triangles(mesh) & known
     valid = np.flatnonzero(~flat & whole)
     # Degenerate triangles have neither neighbours nor an orientation.
-    place = welded(mesh.positions, np.arange(mesh.n_vertices, dtype=np.int32))
+    place = surface_of(subject.actor.figure).place
     corners = place[mesh.triangles[valid]]
     yield from _against(subject, mesh, np.flatnonzero(~flat & known), place)
     yield from _flat(subject, flat)
