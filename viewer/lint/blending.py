@@ -8,11 +8,12 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
-from viewer.lint._subject import Indices, Subject
+from viewer.lint._subject import Subject
 from viewer.lint._surface import FEWEST, LEAST, Support, Surface, support_of, surface_of
 from viewer.phrases import counted, listed, rounded
 from viewer.rig.arrays import Bools
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.topology import edges_of
 from viewer.rig.mesh import Mesh
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skin import Skin, merged, normalized, owners, row_norms
@@ -98,19 +99,11 @@ def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterat
 
 def _on_seams(mesh: Mesh, surface: Surface) -> Bools:
     """Return which vertices end a border edge that continues across coincident vertices: (V,)."""
-    start = mesh.triangles.ravel().astype(np.int64)
-    end = np.roll(mesh.triangles, -1, axis=1).ravel().astype(np.int64)
-    count = mesh.n_vertices
-
-    def uses(a: Indices, b: Indices) -> Indices:
-        keys = np.minimum(a, b) * count + np.maximum(a, b)
-        _, inverse, numbers = np.unique(keys, return_inverse=True, return_counts=True)
-        return numbers[inverse]
-
-    place = surface.place
-    is_seam = (uses(start, end) == 1) & (uses(place[start], place[end]) == 2)
-    result = np.zeros(count, dtype=np.bool_)
-    result[start[is_seam]] = result[end[is_seam]] = True
+    corners = mesh.triangles
+    is_border = edges_of(corners).counts == 1
+    is_seam = is_border & (edges_of(surface.place[corners]).counts == 2)
+    result = np.zeros(mesh.n_vertices, dtype=np.bool_)
+    result[corners.ravel()[is_seam]] = result[np.roll(corners, -1, axis=1).ravel()[is_seam]] = True
     return result
 
 
