@@ -43,8 +43,6 @@ def check(subject: Subject) -> Iterator[Finding]:
         return
     if subject.lacks("weights") or figure.mesh.n_triangles == 0:
         return
-    if figure.skin.n_joints != figure.skeleton.n_joints:
-        return
     surface = surface_of(figure)
     yield from _seams(subject, figure.mesh, figure.skin, surface)
     found = support_of(figure)
