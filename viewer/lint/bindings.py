@@ -17,6 +17,7 @@ from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import joint_labels
+from viewer.rig.skin import moves_vertices
 
 # Fraction of the figure's size: smaller differences are rounding errors of old files.
 _ELSEWHERE = 0.01
@@ -74,8 +75,8 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or skeleton is None or figure.mesh is None:
         return
-    used = np.unique(skin.joints[skin.weights > 0.0])
-    used = used[usable[used] & subject.valid("joints", skeleton.n_joints)[used]]
+    known = subject.valid("joints", skeleton.n_joints) & usable
+    used = np.flatnonzero(moves_vertices(skin) & known)
     if len(used) < _SEVERAL:
         return
     worlds = world_matrices(skeleton, rest_pose(skeleton))[used]

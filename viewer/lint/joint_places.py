@@ -16,7 +16,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.skeleton import joint_labels
-from viewer.rig.skin import bind_positions
+from viewer.rig.skin import bind_positions, moves_vertices
 
 _ZERO = 1e-3  # length of a bone without a length, relative to the figure's size
 # The vertices at which a joint and its parent blend lie around a joint in the middle of a limb, so
@@ -53,8 +53,7 @@ def _zero_lengths(
     """Report joints at the position of their parent, although both move vertices."""
     skeleton, skin = figure.require_skeleton(), figure.require_skin()
     parents = skeleton.parents
-    moves = np.zeros(skeleton.n_joints, dtype=np.bool_)
-    moves[skin.joints[skin.weights > 0.0]] = True
+    moves = moves_vertices(skin)
     above = np.maximum(parents, 0)
     lengths = np.where(parents >= 0, np.linalg.norm(places - places[above], axis=1), np.inf)
     flat = (lengths < _ZERO * size) & moves & moves[above]

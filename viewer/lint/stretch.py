@@ -12,6 +12,7 @@ from viewer.phrases import counted, listed, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import Skeleton, joint_labels
+from viewer.rig.skin import moves_vertices
 
 _STRETCHED = 0.15  # minimum relative change of a bone: more than that of shoulders and soft tissue
 _SCALED = 0.1  # minimum relative change of a joint's scale
@@ -76,8 +77,7 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
     bones: Bools = (parents >= 0) & (parents[above] >= 0) & (branches[above] <= 1)
     bones &= (n_below > 0) | (n_below[above] == 1)
     if figure.skin is not None and figure.is_attached:
-        moves = np.zeros(len(parents), dtype=np.bool_)
-        moves[figure.skin.joints[figure.skin.weights > 0.0]] = True
+        moves = moves_vertices(figure.skin)
         bones &= moves & moves[above]
     return bones
 

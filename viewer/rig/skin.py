@@ -118,6 +118,11 @@ def joint_fractions(skin: Skin) -> Floats:
     return fractions
 
 
+def moves_vertices(skin: Skin) -> Bools:
+    """Return a mask (J,) of joints with a positive weight."""
+    return np.bincount(skin.joints[skin.weights > 0.0], minlength=skin.n_joints) > 0
+
+
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
     """Return joints (N,) without influence; influences of auxiliary ones count for those shown."""
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
