@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from house import reached
+from sources import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
@@ -122,16 +123,10 @@ HOMES = {
 
 
 @cache
-def tree(path: Path) -> ast.Module:
-    """Return the syntax of a file, parsed once."""
-    return ast.parse(path.read_text())
-
-
-@cache
 def nodes(path: Path) -> tuple[ast.AST, ...]:
     """Return the nodes that are checked in a whole file: imports, functions and conditions."""
     kinds = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.If)
-    return tuple(node for node in statements(tree(path)) if isinstance(node, kinds))
+    return tuple(node for node in statements(parsed(path)) if isinstance(node, kinds))
 
 
 def statements(block: ast.AST) -> Iterator[ast.AST]:
@@ -234,7 +229,7 @@ def test_standard_dataclass_decorator_is_not_used():
 
 def test_every_public_module_documents_itself():
     for path in SOURCES:
-        assert ast.get_docstring(tree(path)), path
+        assert ast.get_docstring(parsed(path)), path
 
 
 def test_shaders_state_their_version_and_use_name_prefixes():
@@ -361,7 +356,7 @@ def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is():
     wrong = [
         f"{path}:{node.lineno}: {ast.unparse(node)}"
         for path in SOURCES
-        for node in ast.walk(tree(path))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Assert) and not narrows(node.test)
     ]
     assert not wrong
@@ -372,7 +367,7 @@ def test_broad_handlers_raise_again_or_hand_the_problem_on():
     wrong = []
     for path in SOURCES:
         lines = path.read_text(encoding="utf-8").splitlines()
-        for node in ast.walk(tree(path)):
+        for node in ast.walk(parsed(path)):
             if not isinstance(node, ast.ExceptHandler):
                 continue
             if node.type is not None and ast.unparse(node.type) not in WIDE:

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from string import Formatter
 
+from sources import parsed
+
 import viewer
 from viewer.batching.execution import attempt
 from viewer.batching.items import Item
@@ -28,9 +30,7 @@ SHARED = {name: text for name, text in vars(wording).items() if name.isupper()}
 @cache
 def trees() -> dict[str, ast.Module]:
     paths = sorted(ROOT.rglob("*.py"))
-    return {
-        str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8")) for path in paths
-    }
+    return {str(path.relative_to(ROOT)): parsed(path) for path in paths}
 
 
 def sentences() -> Iterator[tuple[str, str, str]]:
