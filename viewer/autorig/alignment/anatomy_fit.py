@@ -17,7 +17,6 @@ from viewer.autorig.alignment.orientation_search import axis_direction, stated_f
 from viewer.autorig.alignment.pose_fit import (
     Fitted,
     Marks,
-    aligned_positions,
     fit_marks,
     start_of,
 )
@@ -42,13 +41,14 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skin import owners, skin_from_entries, weight_sums
-from viewer.rig.skinning.lbs import blended_matrices
+from viewer.rig.skinning import deform
 
 _AROUND = 1.3  # vertices around a point, up to this multiple of the distance from the surface
 _FEWEST = 8  # minimum number of vertices whose weights a point gets
 _STRENGTH = 1.0  # of marks when nothing else is fitted
 _USUAL_FRONT = np.array([0.0, 0.0, 1.0])
 _SURE_FEET = 0.03  # reach of feet over the height, above which it decides the facing
+_GIRTHS = (np.log(0.25), np.log(4.0))  # limits of the logarithms of girths
 _THINNEST = 0.5  # radius in voxels below which girths are not estimated from it
 
 
@@ -58,6 +58,8 @@ class TemplateBody:
 
     figure: Figure
     pose: Pose
+    positions: Floats
+    """(V, 3). Posed vertices."""
     anatomy: Anatomy
     points: BodyPoints
     is_quadruped: bool
@@ -99,7 +101,7 @@ def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody
     if not plans:
         return None
     points = body_points(anatomy, plans[0], is_quadruped)
-    return TemplateBody(figure, pose, anatomy, points, is_quadruped, left)
+    return TemplateBody(figure, pose, positions, anatomy, points, is_quadruped, left)
 
 
 def left_of(figure: Figure, pose: Pose) -> Floats:
@@ -131,7 +133,7 @@ def _start(body: TemplateBody, target: Anatomy, plan: Plan, is_sure: bool) -> St
     similarity = _similarity(body, target, plan, ours, theirs, weights)
     size = target.size
     marked, vertices = with_marks(
-        body.figure, body.pose, ours, _AROUND * own.radii[common] + body.anatomy.solid.spacing
+        body, ours, _AROUND * own.radii[common] + body.anatomy.solid.spacing
     )
     marks = Marks(vertices, theirs, weights, _STRENGTH)
     few, limbs = _only(marked, limbs_of(marked), vertices)
@@ -192,27 +194,22 @@ def _similarity(
     return Similarity(scale, rotation, to_mean - scale * rotation @ from_mean, np.ones(3))
 
 
-def with_marks(figure: Figure, pose: Pose, points: Floats, reach: Floats) -> tuple[Figure, Ints]:
-    """Return a figure with points (P, 3) of its posed body as vertices, and their numbers.
+def with_marks(body: TemplateBody, points: Floats, reach: Floats) -> tuple[Figure, Ints]:
+    """Return a template with points (P, 3) of its posed body as vertices, and their numbers.
 
     Each gets the mean weights of the vertices within its ``reach`` (P,), in the figure's unit; a
     point at a joint is attached to that joint.
     """
     from scipy import spatial
 
-    mesh, skeleton, skin = figure.attached()
-    world = world_matrices(skeleton, pose)
-    palette = skinning_matrices(world, skin.inverse_bind)
-    place = placement_matrix(pose)
-    matrices = blended_matrices(skin, palette)
-    bound = np.einsum("vab,vb->va", matrices[:, :, :3], mesh.positions) + matrices[:, :, 3]
-    posed = bound @ place[:3, :3].T + place[:3, 3]
+    mesh, skeleton, skin = body.figure.attached()
+    world = placement_matrix(body.pose) @ world_matrices(skeleton, body.pose)
+    palette, joints = skinning_matrices(world, skin.inverse_bind), world[:, :3, 3]
     used = np.unique(mesh.triangles)
-    tree = spatial.cKDTree(posed[used])
-    joints = world[:, :3, 3] @ place[:3, :3].T + place[:3, 3]
-    size = float(np.ptp(posed[used], axis=0).max())
-    sums = weight_sums(skin)
-    of, shares = owners(skin), skin.weights / np.where(sums > 0.0, sums, 1.0)[owners(skin)]
+    tree = spatial.cKDTree(body.positions[used])
+    size = float(np.ptp(body.positions[used], axis=0).max())
+    of, sums = owners(skin), weight_sums(skin)
+    shares = skin.weights / np.where(sums > 0.0, sums, 1.0)[of]
     table = np.zeros((len(points), skin.n_joints))
     for row, (point, radius) in enumerate(zip(points, reach.tolist(), strict=True)):
         at = np.linalg.norm(joints - point, axis=1)
@@ -226,7 +223,7 @@ def with_marks(figure: Figure, pose: Pose, points: Floats, reach: Floats) -> tup
         table[row] = np.bincount(skin.joints[chosen], shares[chosen], minlength=skin.n_joints)
         table[row] /= max(float(table[row].sum()), 1e-12)
     # In the bind pose, the point is where its blended matrix poses it to the given position.
-    blended = np.einsum("pj,jab->pab", table, place @ palette)
+    blended = np.einsum("pj,jab->pab", table, palette)
     rest = np.linalg.solve(blended[:, :3, :3], (points - blended[:, :3, 3])[..., None])[..., 0]
     count = len(mesh.positions)
     rows, columns = np.nonzero(table)
@@ -239,9 +236,8 @@ def with_marks(figure: Figure, pose: Pose, points: Floats, reach: Floats) -> tup
     )
     positions = np.concatenate([mesh.positions, rest])
     normals = np.concatenate([mesh.normals, np.zeros_like(rest)])
-    plain = Figure(
-        figure.name, Mesh(positions, normals, mesh.triangles), skeleton, grown, up=figure.up
-    )
+    marked = Mesh(positions, normals, mesh.triangles)
+    plain = Figure(body.figure.name, marked, skeleton, grown, up=body.figure.up)
     return plain, np.arange(count, count + len(points), dtype=np.int32)
 
 
@@ -259,10 +255,8 @@ def _girths(figure: Figure, limbs: Limbs, ratios: Floats) -> Floats:
     return np.clip(0.5 * (girths + girths[limbs.partners]), *_GIRTHS)
 
 
-_GIRTHS = (np.log(0.25), np.log(4.0))  # limits of the logarithms of girths
-
-
 def _error(fitted: Fitted, marks: Marks, size: float) -> float:
-    gaps = aligned_positions(fitted)[marks.vertices] - marks.targets
+    posed = fitted.similarity.apply(deform(fitted.figure, fitted.pose)[0])
+    gaps = posed[marks.vertices] - marks.targets
     squares = np.einsum("na,na->n", gaps, gaps)
     return float(np.sqrt(marks.weights @ squares / marks.weights.sum())) / size

@@ -165,14 +165,6 @@ def fit_pose(
     return state
 
 
-def aligned_positions(state: Fitted) -> Floats:
-    """Return the vertices of a fitted template in the target's frame: (V, 3)."""
-    mesh, skeleton, skin = state.figure.attached()
-    palette = skinning_matrices(world_matrices(skeleton, state.pose), skin.inverse_bind)
-    posed = move(mesh.positions, skin, palette)[0]
-    return state.similarity.apply(apply_transform(placement_matrix(state.pose), posed))
-
-
 def _aligned_template(state: Fitted, limbs: Limbs) -> AlignedTemplate:
     mesh, skeleton, skin = state.figure.attached()
     world = world_matrices(skeleton, state.pose)
