@@ -454,6 +454,10 @@ def test_glb_of_a_new_rig_has_four_influences_unless_more_are_requested(tmp_path
         (["--method", "robust"], "--method: expected heat or voxel with --skeleton, found robust"),
         (["--max-angle", "20"], "--max-angle: expected a template (--from) to match, found "
          "--skeleton"),
+        (["--no-refine"], "--no-refine: expected a template (--from) to match, found --skeleton"),
+        (["--template-frame", "3"], "--template-frame: expected a template with a motion, found "
+         "none; add the motion's file with another --skeleton, as in --skeleton body --skeleton "
+         "walk.npz"),
     ],
 )  # fmt: skip
 def test_options_of_templates_are_refused_with_a_skeleton(bar, capsys, options, said):

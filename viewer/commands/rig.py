@@ -252,6 +252,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
         "--max-angle": match.max_angle != usual_match.max_angle,
         "--joints": own.joints != usual.joints,
         "--no-fit": own.fits != usual.fits,
+        "--no-refine": not settings_of(AlignmentSettings, arguments).refines,
     }
     for option, is_given in only_for_templates.items():
         if is_given:
@@ -273,7 +274,7 @@ def _template(
         asked = "--time" if frames.frame is None else frames.option
         raise ViewerError(
             f"{asked}: expected a template with a motion, found none; add the motion's file with "
-            "another --from, as in --from body --from walk.npz"
+            f"another {option}, as in {option} body {option} walk.npz"
         )
     only_skeleton = option == "--skeleton"
     if not frames.is_one:

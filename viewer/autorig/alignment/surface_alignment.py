@@ -172,9 +172,9 @@ def align(
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
         return Alignment.of(ours, theirs, _refined(fine, start, settings), "landmarks")
     # A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
-    # not moved: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
-    # rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
-    # refined on the surfaces.
+    # not moved: fitting a part (a shirt, an open shell) would only move it away. Otherwise the
+    # rotations by 90 degrees about the up axis are tried, each with a few iterations of closest
+    # points; the best is refined on the surfaces.
     rotations = axis_rotations(template_up, settings.up, settings.facing)
     stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
     report_fraction(0.1, "aligning the template")
