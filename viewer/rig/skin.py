@@ -174,6 +174,14 @@ def strongest_first(skin: Skin) -> Skin:
     return replace(skin, joints=skin.joints[order], weights=skin.weights[order])
 
 
+def strongest_influences(skin: Skin) -> Ints:
+    """Return the strongest influence of each vertex that has influences, as indices: (M,)."""
+    vertices = owners(skin)
+    order = np.lexsort((skin.weights, vertices))
+    last = np.flatnonzero(np.diff(vertices[order], append=-1))
+    return order[last].astype(np.int32)
+
+
 def limit_influences(skin: Skin, count: int) -> Skin:
     """Merge, prune to the ``count`` largest and normalise each vertex's influences."""
     ordered = strongest_first(merged(skin))

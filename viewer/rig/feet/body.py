@@ -111,9 +111,7 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
         # Feet must move with their legs: animators' controls may be joints of the root.
         if not {leg.hip, leg.knee, leg.ankle} <= set(path_to_root(skeleton.parents, leg.toe)):
             return None
-    weights = figure_pose(figure).shape_weights
-    if clip.shape_weights is not None:
-        weights = clip.shape_weights[0]
+    weights = shape_of(figure, clip)
     body = shaped(figure, weights)
     soles = soles_of_feet(body, [[leg.toe, leg.ankle] for leg in legs], figure.is_attached)
     chains = chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
@@ -145,6 +143,13 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
     clearance = float(toes.mean() - floor)
     levels = level, toe_level
     return BodyLegs(chains, own, moved, *levels, rests, extensions, size, clearance)
+
+
+def shape_of(figure: Figure, clip: SampledClip) -> Floats:
+    """Return the shape weights (S,) at the start of a motion: its own, or the figure's."""
+    if clip.shape_weights is None:
+        return figure_pose(figure).shape_weights
+    return clip.shape_weights[0]
 
 
 def is_solvable(linear: Floats) -> bool:

@@ -17,7 +17,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.pose import zero_pose
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import rest_joints
-from viewer.rig.skin import Skin, owners
+from viewer.rig.skin import Skin, owners, strongest_influences
 
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
 # Tilts of a foot, from walking to lying on its instep.
@@ -125,9 +125,7 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
 def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Floats] | None:
     """Return vertices of a foot's hull that can be lowest: joints (P,) and positions (P, 3)."""
     vertices = owners(skin)
-    order = np.lexsort((skin.weights, vertices))
-    last = np.flatnonzero(np.diff(vertices[order], append=-1))
-    strongest = order[last]  # strongest influence of each vertex that has influences
+    strongest = strongest_influences(skin)
     strongest = strongest[is_foot[skin.joints[strongest]] & (skin.weights[strongest] > 0.0)]
     if len(strongest) == 0:
         return None

@@ -18,16 +18,15 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import Remedy
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import in_frame_order
-from viewer.rig.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds
+from viewer.rig.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds, shape_of
 from viewer.rig.feet.legs import Leg, leg_rotations
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.retarget import Retargeted
-from viewer.rig.scene import figure_pose
 from viewer.rig.shape import rest_joints, shaped
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import owners
+from viewer.rig.skin import owners, strongest_influences
 
 # Parts of the body as chains of joints; the bones between those that are matched count.
 _PARTS = (
@@ -100,9 +99,7 @@ def keep_hands(
     if not needed <= mine.keys() or mine.keys().isdisjoint(_TOPS) or not clip.n_rows:
         return clip, None
     given, clip = clip, in_frame_order(clip)
-    weights = figure_pose(figure).shape_weights
-    if clip.shape_weights is not None:
-        weights = clip.shape_weights[0]
+    weights = shape_of(figure, clip)
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     body = _Body(skeleton, clip, mine, rests)
     theirs = {name: partners[joint] for name, joint in mine.items()}
@@ -236,9 +233,7 @@ def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, f
     mesh, skin = figure.mesh, figure.skin
     if mesh is None or skin is None or not figure.is_attached:
         return {}
-    vertices = owners(skin)
-    order = np.lexsort((skin.weights, vertices))
-    strongest = order[np.flatnonzero(np.diff(vertices[order], append=-1))]
+    vertices, strongest = owners(skin), strongest_influences(skin)
     points, result = rest_joints(figure), {}
     for start, end in _bones(joints):
         own = vertices[strongest[skin.joints[strongest] == joints[start]]]
