@@ -62,7 +62,7 @@ class KeptHands:
 
 
 class _Body:
-    """Joints of a body by meaning, in frames of a motion; lengths relative to its height."""
+    """Joints of a body by meaning, in all rows of a motion, without its place and scale."""
 
     def __init__(
         self, skeleton: Skeleton, clip: SampledClip, joints: dict[str, int], rests: Floats
@@ -79,7 +79,7 @@ class _Body:
         self.height = float(np.linalg.norm(neck - pelvis) + limb)
 
     def at(self, name: str) -> Floats:
-        """Return the positions of a joint: (N, 3)."""
+        """Return the positions of a joint relative to the height: (N, 3)."""
         return self.world[:, self.place[name], :3, 3] / self.height
 
 
@@ -142,7 +142,7 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
     return [
         note(
             "F007.hands-kept: hands of {figure} kept at its body where those of {motion} are at "
-            "theirs: they miss by {after:.1f} % of the height from ankles to neck instead of "
+            "the body: they miss by {after:.1f} % of the height from ankles to neck instead of "
             "{before:.1f} %; {remedy} disables this",
             figure=figure.name,
             motion=found.source.figure.name,
