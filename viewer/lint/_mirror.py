@@ -9,6 +9,7 @@ from viewer.lint._surface import surface_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import Indices
+from viewer.rig.geometry.vectors import reflected
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import sided_words
@@ -75,17 +76,14 @@ def _mirror(figure: Figure) -> Mirror | None:
     known[firsts[paired]] = True
     joints = name_partners(figure.require_skeleton())
     places = bind_positions(figure.require_skin())
-    images = places.copy()
-    images[:, axis] = 2.0 * centre - images[:, axis]
-    errors = np.linalg.norm(images - places[joints], axis=1)
+    errors = np.linalg.norm(reflected(places, axis, centre) - places[joints], axis=1)
     errors[joints < 0] = 0.0
     return Mirror(axis, centre, vertices, known, joints, errors)
 
 
 def _counterparts(points: Floats, axis: int, centre: float, tolerance: float) -> Indices:
     """Return for each point the one at its image that has it at its own (N,); -1 if none."""
-    images = points.copy()
-    images[:, axis] = 2.0 * centre - images[:, axis]
+    images = reflected(points, axis, centre)
     # Points are found by their cell. An image is near at most one wall of its cell along each axis,
     # so eight cells contain all points within half a cell.
     cell = 4.0 * tolerance

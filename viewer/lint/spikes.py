@@ -13,6 +13,7 @@ from viewer.lint._surface import FEWEST, Surface, surface_of
 from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.topology import Indices
+from viewer.rig.geometry.vectors import reflected
 
 # The height of a vertex is its distance from the mean of its neighbours. The tips of ears, hair and
 # claws of 40 figures of artists are at most 2.2 edges high, those of weapons 4.
@@ -85,8 +86,7 @@ def _one_sided(
     alone = np.flatnonzero(is_place & ~mirror.known & (degree >= 3) & (known == degree))
     for vertex in alone.tolist():
         other = _opposite(surface, mirror, vertex, alone)
-        image = points[vertex].copy()
-        image[mirror.axis] = 2.0 * mirror.centre - image[mirror.axis]
+        image = reflected(points[vertex], mirror.axis, mirror.centre)
         is_moved = other is not None and np.linalg.norm(points[other] - image) > least
         # Of the two, the one that is higher above its neighbours was moved.
         if other is not None and is_moved and heights[vertex] >= heights[other]:

@@ -34,6 +34,13 @@ def axis_vector(name: str) -> Floats:
     return np.eye(3)["xyz".index(name)]
 
 
+def reflected(points: Floats, axis: int, centre: float = 0.0) -> Floats:
+    """Return the mirror images of points (..., 3) across the plane at ``centre`` on an axis."""
+    images = points.copy()
+    images[..., axis] = 2.0 * centre - images[..., axis]
+    return images
+
+
 def moved_tangents(tangents: Floats, linear: Floats) -> Floats:
     """Return tangents (N, 4) moved by A (3, 3), t' = A t / |A t|; reflections change signs.
 

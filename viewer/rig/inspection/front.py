@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import Up, axis_vector
+from viewer.rig.geometry.vectors import Up, axis_vector, reflected
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.scene import Actor, Scene
@@ -251,9 +251,8 @@ def _from_soles(positions: Floats, up: Floats) -> Floats:
 def _is_symmetric(positions: Floats, axis: int) -> bool:
     """Return whether a mesh is nearly symmetric about a plane through its centre."""
     size = _LEAST * _size(positions)
-    mirrored = positions[:: max(len(positions) // _LOOKED_AT, 1)].copy()
     middle = bounding_box(positions).mean(axis=0)[axis]
-    mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
+    mirrored = reflected(positions[:: max(len(positions) // _LOOKED_AT, 1)], axis, middle)
     low = positions.min(axis=0)
     # Vertices that are no farther apart than the cell size lie in the same or in adjacent cells, so
     # 27 look-ups find them without a search tree.

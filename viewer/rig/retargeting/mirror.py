@@ -11,6 +11,7 @@ from viewer.diagnostics import Phrase, note
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import reflected
 from viewer.rig.kinematics import rest_world_rotations, world_rotations
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, joint_rotations
@@ -42,9 +43,8 @@ def asymmetry(figure: Figure) -> Floats:
 def _mirror_distances(figure: Figure, axis: int) -> Floats:
     mesh = figure.require_mesh()
     assert figure.symmetry is not None  # checked by the callers
-    partner = mesh.positions[figure.symmetry].copy()
-    partner[:, axis] *= -1.0
-    return np.linalg.norm(mesh.positions - partner, axis=1)
+    images = reflected(mesh.positions[figure.symmetry], axis)
+    return np.linalg.norm(mesh.positions - images, axis=1)
 
 
 def joint_partners(figure: Figure) -> Ints:
@@ -58,9 +58,8 @@ def joint_partners(figure: Figure) -> Ints:
             note("F004.mirror: figure {figure} has no skeleton to mirror", figure=figure.name)
         )
     joints = rest_joints(figure)
-    mirrored = joints.copy()
     axis = mirror_axis(figure)
-    mirrored[:, axis] = 2.0 * joints[0, axis] - mirrored[:, axis]
+    mirrored = reflected(joints, axis, joints[0, axis])
     depths = np.zeros(skeleton.n_joints, dtype=int)
     for joint, parent in enumerate(skeleton.parents):
         depths[joint] = depths[parent] + 1 if parent >= 0 else 0

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import reflected
 from viewer.rig.retargeting.mirror import mirror_axis
 from viewer.rig.scalars._inputs import Asked, influences_kept
 from viewer.rig.skinning import PURE, Skinning, deform
@@ -45,9 +46,8 @@ def asymmetry(asked: Asked) -> Floats:
     positions = deform(figure, pose, asked.skinning)[0]
     # A translation of the whole figure does not affect its symmetry.
     positions -= pose.figure_translation
-    mirrored = positions[figure.symmetry].copy()
-    mirrored[:, mirror_axis(figure)] *= -1.0
-    return np.linalg.norm(positions - mirrored, axis=1)
+    images = reflected(positions[figure.symmetry], mirror_axis(figure))
+    return np.linalg.norm(positions - images, axis=1)
 
 
 def _distance(asked: Asked, one: Skinning, other: Skinning) -> Floats:
