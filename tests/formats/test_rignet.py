@@ -45,6 +45,14 @@ def test_joints_have_their_positions_and_parents_come_first():
     assert made.place("joints", 0)[1] == 2
 
 
+def test_names_that_are_not_utf_8_stay_different():
+    text = "joints 頭 0 0 0\njoints 首 1 0 0\nroot 首\nhier 首 頭\n"
+    names = read(Source("rig.txt", text.encode("shift_jis"))).skeleton.names
+    assert [name.encode("utf-8", "surrogateescape").decode("shift_jis") for name in names] == [
+        "首", "頭"
+    ]  # fmt: skip
+
+
 def test_joints_without_a_parent_are_further_roots():
     made = source("joints a 0 0 0\njoints b 1 0 0\njoints c 2 0 0\nroot b\nhier b c\n")
     skeleton = read(made).skeleton

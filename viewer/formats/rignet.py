@@ -74,7 +74,7 @@ def read(source: Source) -> Figure:
     order = _ordered(source, found)
     rows = {name: row for row, name in enumerate(order)}
     parents = [rows[found.parents[name]] if name in found.parents else -1 for name in order]
-    names = tuple(name.decode("utf-8", "replace") for name in order)
+    names = tuple(name.decode("utf-8", "surrogateescape") for name in order)
     places = np.array([found.places[name] for name in order])
     source.remember("joints", lambda joint: found.starts[order[joint]])
     others = [name for name, above in zip(names, parents, strict=True) if above < 0][1:]
@@ -120,19 +120,18 @@ def _read_line(source: Source, found: _Joints, start: int, words: list[bytes]) -
             found=counted(len(rest), "word"),
         )
     if word == b"joints":
-        name, values = rest[0], [to_number(number) for number in rest[1:]]
-        numbers = [value for value in values if value is not None and abs(value) <= LARGEST]
-        if len(numbers) < 3:
-            wrong = next(
-                n for n, value in enumerate(values) if value is None or value not in numbers
-            )
-            raise source.fault(
-                wording.VALUE,
-                start,
-                item=Phrase("joint {name}", name=quoted(name)),
-                expected=Phrase("3 numbers within ±{most}", most=f"{LARGEST:g}"),
-                found=quoted(rest[1 + wrong]),
-            )
+        name, numbers = rest[0], []
+        for number in rest[1:]:
+            value = to_number(number)
+            if value is None or abs(value) > LARGEST:
+                raise source.fault(
+                    wording.VALUE,
+                    start,
+                    item=Phrase("joint {name}", name=quoted(name)),
+                    expected=Phrase("3 numbers within ±{most}", most=f"{LARGEST:g}"),
+                    found=quoted(number),
+                )
+            numbers.append(value)
         if name in found.places:
             raise source.fault(
                 "F002.rignet-twice: expected different names, found {name} twice",
@@ -169,7 +168,8 @@ def _ordered(source: Source, found: _Joints) -> list[bytes]:
         children[parent].append(child)
     roots = [name for name in found.places if name not in found.parents]
     if found.root is not None:
-        roots.sort(key=lambda name: name != (found.root or roots)[0])
+        first = found.root[0]
+        roots.sort(key=lambda name: name != first)
     order: list[bytes] = []
     pending = roots[::-1]
     while pending:
