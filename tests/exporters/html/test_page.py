@@ -174,6 +174,25 @@ def test_weights_that_do_not_sum_to_one_are_exact(browser, tmp_path):
 
 
 @needs_chromium
+def test_small_figure_far_away_is_exact(browser, tmp_path):
+    """Scales of 0.01, and places a thousand times the figure's size away, as in centimetres."""
+    figure = tangle(n_joints=6, n_influences=3)
+    actor = moving(figure)
+    far = actor.clip.translations.copy()
+    far[:, 0, 0] += 4000.0
+    scales = 0.01 * actor.clip.figure_scales
+    actor.clip = replace(actor.clip, translations=far, figure_scales=scales)
+    (animation,), _ = write(tmp_path / "a.html", actor)
+    browser.open(tmp_path / "a.html")
+    size = box_size(bounding_box(figure.mesh.positions))
+    for frame in (0, 3):
+        wanted = deform(figure, pose_of(figure, animation.frames, frame), Skinning())[0]
+        found = positions_at(browser, frame / 10)
+        apart = np.linalg.norm(found - wanted, axis=1).max()
+        assert apart <= EXACT * size * scales[frame], frame
+
+
+@needs_chromium
 def test_people_come_and_go(browser, tmp_path):
     first = moving(tangle(n_joints=5, n_influences=3))
     second = moving(tangle(n_joints=6, n_influences=2, seed=4), missing=(1, 2), seed=5)

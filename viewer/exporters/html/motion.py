@@ -33,7 +33,7 @@ float32, stay below 1e-5 of the size."""
 
 _EQUAL = 1e-9  # relative difference of lengths that counts as none
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
-_SCALE_STEP = 1e-7  # of the scale of the whole figure
+_SCALE_STEP = 1e-7  # largest step of the scale of the whole figure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,13 @@ def pack_tracks(tracks: Tracks, packer: Packer) -> Json:
     size = size_of(tracks.rest)
     fine = FINE * size
     n_frames, n_bound = tracks.rotations.shape[:2]
-    motion: Json = {"n": n_frames, "model": packer.add(tracks.model, [fine] * 3 + [_SCALE_STEP])}
+    # The scale moves the farthest joint most, and a small scale also needs small steps.
+    reach = max(
+        size, *(float(np.abs(each).max(initial=0.0)) for each in (tracks.places, tracks.joints))
+    )
+    seen = min(float(np.abs(tracks.model[:, 3]).max()), 1.0) or 1.0
+    steps = [seen * fine] * 3 + [seen * min(_SCALE_STEP, fine / reach)]
+    motion: Json = {"n": n_frames, "model": packer.add(tracks.model, steps)}
     skin, mesh = tracks.rest.skin, tracks.rest.mesh
     if n_bound and skin is not None:
         lever = np.full(n_bound, size) if mesh is None else levers(skin, mesh.positions)
