@@ -336,9 +336,25 @@ def test_notes_state_errors_of_the_written_numbers(tmp_path):
     (animation,), notes = write(tmp_path / "a.html", moving(tangle()))
     assert animation.frames.n_frames == 5
     assert any("5 frames, 0.4 s" in each for each in notes)
-    assert_allclose([each.count("vertices differ") for each in notes[1:2]], [1])
-    percent = float(re.search(r"up to ([\d.]+) %", " ".join(notes))[1])
-    assert 0.0 < percent <= 100.0 * EXACT
+    assert_allclose([each.count("; vertices by up to") for each in notes[1:2]], [1])
+    percents = [float(each) for each in re.findall(r"up to ([\d.]+) %", " ".join(notes))]
+    assert len(percents) == 2 and all(0.0 < each <= 100.0 * EXACT for each in percents)
+
+
+def test_notes_state_errors_of_all_joints_and_of_some_vertices(tmp_path):
+    """One frame far away makes the steps of all places coarse, and is not among the 64 skinned."""
+    actor = moving(tangle(n_joints=4, n_influences=2), n_frames=120)
+    far = actor.clip.translations.copy()
+    far[33, 0] = 1e7, 0.0, 0.0
+    actor.clip = replace(actor.clip, translations=far)
+    _, notes = write(tmp_path / "a.html", actor)
+    (said,) = [each for each in notes if "differ" in each]
+    percents = [float(each) for each in re.findall(r"up to ([\d.]+) %", said)]
+    assert "joints differ" in said and "(vertices compared in 64 of 120 frames)" in said
+    assert len(percents) == 2 and all(0.05 < each < 1.0 for each in percents), said
+    bare = replace(actor, figure=replace(actor.figure, mesh=None, skin=None))
+    _, notes = write(tmp_path / "b.html", bare)
+    assert [each.count("joints differ") for each in notes if "differ" in each] == [1]
 
 
 def test_notes_name_the_figure_and_the_missing_frames(tmp_path):
@@ -351,10 +367,8 @@ def test_notes_name_the_figure_and_the_missing_frames(tmp_path):
     )
     notes = [str(each) for each in found]
     assert "b: frames 1, 3 missing, as in the original motion" in notes, notes
-    assert sum("vertices differ" in each for each in notes) == 2
-    numbers = [
-        int(re.search(r"frame (\d)", each)[1]) for each in notes if "vertices differ" in each
-    ]
+    assert sum("; vertices by up to" in each for each in notes) == 2
+    numbers = [int(re.search(r"frame (\d)", each)[1]) for each in notes if "; vertices" in each]
     assert numbers[1] in (2, 4), numbers  # as in the motion, where b is present
 
 

@@ -49,7 +49,8 @@ class PoseLosses:
     """The largest errors of the poses of a figure, unshaped, that one or several files contain."""
 
     def __init__(self, figure: Figure, how: Skinning) -> None:
-        self._figure, self._how, self._looked = figure, how, 0
+        self._figure, self._how = figure, how
+        self._looked = self._skinned = 0
         self._joints: Farthest | None = None
         self._vertices: Farthest | None = None
 
@@ -73,6 +74,7 @@ class PoseLosses:
             wanted = joint_matrices(figure, pose)[:, :3, 3]
             self._joints = _farther(self._joints, joints - wanted, least, frame)
         if vertices is not None:
+            self._skinned += 1
             wanted = deform(figure, pose, self._how.unreduced())[0]
             wanted = wanted if sources is None else wanted[sources]
             found = _farther(self._vertices, vertices - wanted, least, frame)
@@ -84,7 +86,8 @@ class PoseLosses:
         self, path: Path, first_frame: int | None = None, causes: list[Phrase] | None = None
     ) -> list[Diagnostic]:
         """Return a note with the largest errors, and ``causes`` of those of vertices, if any."""
-        found = Apart(self._joints, self._vertices, self._looked, self._looked)
+        looked = self._looked if self._vertices is None else self._skinned
+        found = Apart(self._joints, self._vertices, looked, self._looked)
         notes = apart_notes(path, self._figure, found, first_frame)
         if self._vertices is None:
             return notes

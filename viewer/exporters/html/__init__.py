@@ -26,6 +26,7 @@ from viewer.errors import RenderError, RigError
 from viewer.exporters._exporter import Part, Selection
 from viewer.exporters._gaps import filled, kept_gaps, kept_note
 from viewer.exporters._left_out import motion_notes, of_figure
+from viewer.exporters._losses.largest_distances import REGULAR, evenly
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
 from viewer.exporters.html.figures import pack_mesh, pack_skin, plain
@@ -57,7 +58,7 @@ from viewer.rig.srgb import decode_srgb
 
 _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")
-_SEEN = 9  # frames that are framed, measured and shown as still pictures at most
+_SEEN = 9  # frames that the camera frames, at most
 _POSTER = (800, 450)
 _ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fit
 
@@ -170,13 +171,16 @@ class _Shown:
     def losses(
         self, path: Path, packed: Json, center: Floats, arrays: Sequence[Floats], how: Skinning
     ) -> list[Diagnostic]:
-        """Return notes about the largest errors of the numbers in the file, in some frames."""
-        losses = PoseLosses(self.actor.figure, how)
-        for frame in self.seen:
+        """Return a note about the largest errors of the numbers in the file."""
+        losses, frames = PoseLosses(self.actor.figure, how), np.flatnonzero(self.present)
+        skinned = set(evenly(len(frames), REGULAR).tolist()) if "mesh" in packed else set()
+        for row, frame in enumerate(frames.tolist()):
+            report(row, len(frames), "frames", "comparing with the original")
             vertices = None
-            if "mesh" in packed:
+            if row in skinned:
                 vertices = _unpacked_vertices(packed, center, arrays, frame, self.tracks, how)
-            losses.look(self.poses[frame], vertices, frame=frame)
+            joints = _unpacked_joints(packed["motion"], arrays, frame)
+            losses.look(self.poses[frame], vertices, joints, frame=frame)
         return losses.notes(path, self.first_frame)
 
 
@@ -208,8 +212,21 @@ def _unpacked_vertices(
         palette[:, :3, 3] = arrays[motion["places"]][frame].reshape(-1, 3)
         palette[:, :3, 3] -= np.einsum("jab,jb->ja", linear, binds)
         moved = skinned(mesh, skin, rest, palette, how)[0]
+    return _in_figure(moved, motion, arrays, frame)
+
+
+def _unpacked_joints(motion: Json, arrays: Sequence[Floats], frame: int) -> Floats | None:
+    """Return the places (J, 3) of joints that the numbers of a page mean in a frame, if any."""
+    track = motion.get("joints", motion.get("places"))
+    if track is None:
+        return None
+    return _in_figure(arrays[track][frame].reshape(-1, 3), motion, arrays, frame)
+
+
+def _in_figure(points: Floats, motion: Json, arrays: Sequence[Floats], frame: int) -> Floats:
+    """Return points (N, 3) in the space of the figure, which its root scales and moves."""
     model = arrays[motion["model"]][frame]
-    return model[3] * moved + model[:3]
+    return model[3] * points + model[:3]
 
 
 def _shown(part: Part, options: ExportOptions, first: float) -> _Shown:
