@@ -87,3 +87,4 @@ def test_notes_about_several_animations_are_one_line():
     (found,) = [one for one in lint_scene(Scene([actor])) if one.code == "C008"]
     assert found.motion == "walk, run, hop and 1 more"
     assert found.message.endswith("; first of 4")
+    assert found.diagnostic.values["animations"] == list(names)

@@ -87,7 +87,7 @@ def lint_scene(
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
-    """Return findings in order; equal notes about several animations are one, with their names."""
+    """Return findings in order; notes of one kind about several animations are one, with names."""
     alike: dict[object, list[Finding]] = {}
     for place, found in enumerate(findings):
         is_common = found.severity == "note" and found.motion
@@ -100,8 +100,10 @@ def _joined(group: Sequence[Finding]) -> Finding:
     first = group[0]
     if len(group) == 1:
         return first
-    motion = str(listed([found.motion for found in group], _NAMED))
-    return replace(first, motion=motion, diagnostic=replace(first.diagnostic, count=len(group)))
+    names = [found.motion for found in group]
+    values = {**first.diagnostic.values, "animations": names}
+    diagnostic = replace(first.diagnostic, count=len(group), values=values)
+    return replace(first, motion=str(listed(names, _NAMED)), diagnostic=diagnostic)
 
 
 def _checked(
