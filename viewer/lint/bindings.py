@@ -92,8 +92,8 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
     off = off[np.argsort(-angles[usual][off], kind="stable")]
     joints, labels = used[off], joint_labels(skeleton)
     yield subject.found(
-        "B007.rotations: {n} bound with another rotation than at rest: {names} (worst: {joint} by "
-        "{angle:.0f}°)",
+        "B007.rotations: {n} bound with a rotation that differs from the rest pose: {names} "
+        "(worst: {joint} by {angle:.0f}°)",
         n=counted(len(joints), "joint", "is", "are"),
         names=listed([labels[joint] for joint in joints]),
         joint=labels[joints[0]],

@@ -83,8 +83,8 @@ def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterat
     torn = torn[np.argsort(-differences[torn], kind="stable")]
     first = int(torn[0])
     yield subject.found(
-        "W014.seams: {n} other weights than a vertex at the same position, so that the seam opens "
-        "(worst: vertices {vertex} and {other}, a total difference of {difference})",
+        "W014.seams: {n} weights that differ from those of a vertex at the same position, so the "
+        "seam opens (worst: vertices {vertex} and {other}, a total difference of {difference})",
         n=counted(len(torn), "vertex", "has", "have", of=len(copies)),
         all=len(copies),
         vertex=first,
@@ -125,8 +125,9 @@ def _hard(subject: Subject, figure: Figure, found: Support, surface: Surface) ->
     labels = joint_labels(figure.require_skeleton())
     if is_hard.sum() > _ALL_HARD * len(edges):
         yield subject.found(
-            "W015.everywhere: {n} between joints hard: each vertex moves with one joint",
-            n=counted(int(is_hard.sum()), "edge", "is", "are", of=len(edges)),
+            "W015.everywhere: weights change from joint to joint without blending at {n}: each "
+            "vertex moves with one joint",
+            n=counted(int(is_hard.sum()), "edge", of=len(edges)),
             all=len(edges),
             vertices=np.unique(edges[is_hard]),
             at=("weights", int(edges[is_hard][0, 0])),

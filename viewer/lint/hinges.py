@@ -64,7 +64,7 @@ def _hinge(
     wrong = wrong[np.argsort(-bends[wrong], kind="stable")]
     each, first = track.of_each(rows[wrong]), int(rows[wrong[0]])
     yield subject.found(
-        "C024.hinge: {n}: {joint} bends by {angle:.0f}° to the other side than usual at frame "
+        "C024.hinge: {n}: {joint} bends the wrong way by {angle:.0f}° at frame "
         "{frame}, {time:z.3f} s",
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,

@@ -108,9 +108,9 @@ def _outside(
     joints = [joint for _, joint in sorted(outside, reverse=True)]
     labels = joint_labels(figure.require_skeleton())
     yield subject.found(
-        "S012.joints: {n} outside the limb that {bends} there: {names}",
+        "S012.joints: {n} outside {limb} there: {names}",
         n=counted(len(joints), "joint", "is", "are"),
-        bends=agree(len(joints), "bends", "bend"),
+        limb=agree(len(joints), "the limb that bends", "the limbs that bend"),
         names=listed([labels[joint] for joint in joints]),
         part="skeleton",
         joints=joints,

@@ -217,8 +217,9 @@ def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size
 def _swapped_finding(subject: Subject, figure: Figure, joints: Indices) -> Finding:
     labels = joint_labels(figure.require_skeleton())
     return subject.found(
-        "W013.swapped: {n} the vertices around another one, which moves theirs: {names}",
-        n=counted(len(joints), "joint", "moves", "move"),
+        "W013.swapped: weights of {n} are exchanged in pairs: {names}; each of a pair moves the "
+        "vertices around the other",
+        n=counted(len(joints), "joint"),
         names=listed([labels[joint] for joint in joints]),
         joints=joints,
         at=("bindings", int(joints[0])),

@@ -214,9 +214,9 @@ def _names(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding
         return
     labels = joint_labels(skeleton)
     yield subject.found(
-        "Y004.names: {n} on the other side than {their} says: {names}",
+        "Y004.names: {n} not on the side that {their}: {names}",
         n=counted(len(wrong), "joint", "is", "are"),
-        their=agree(len(wrong), "its name", "their names"),
+        their=agree(len(wrong), "its name says", "their names say"),
         names=listed([labels[joint] for joint in wrong]),
         joints=wrong,
         part="skeleton",
