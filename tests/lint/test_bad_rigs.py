@@ -24,6 +24,8 @@ from viewer.lint import (
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.hierarchy import descendants
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor
@@ -267,6 +269,21 @@ def test_body_has_no_finding_in_other_axes(scale, up):
     assert linted(figure) == []
     again = linted(placed(stray(0.3)(), scale, up), (stray_weights,))
     assert [one.diagnostic.key for one in again] == ["W011.strays"]
+
+
+def test_joints_below_one_without_valid_data_are_not_compared():
+    """All joints of the arm are bound with 60 degrees, whose rotation at rest is invalid."""
+    figure, shoulder = body(), joint("left_shoulder")
+    turn = np.eye(4)
+    turn[:3, :3] = axis_rotations(2, np.radians(-60.0))
+    about = translation_matrix(rest_joints(figure)[shoulder])
+    arm = descendants(figure.skeleton.parents, shoulder)
+    binds = figure.skin.inverse_bind.copy()
+    binds[arm] = binds[arm] @ about @ turn @ np.linalg.inv(about)
+    actor = Actor(replace(figure, skin=replace(figure.skin, inverse_bind=binds)))
+    (found,) = [one for one in bindings.check(Subject(actor)) if one.code == "B007"]
+    assert sorted(found.joints) == np.flatnonzero(arm).tolist()
+    assert [*bindings.check(Subject(actor, invalid={"joints": np.array([shoulder])}))] == []
 
 
 def test_part_that_moves_with_a_distant_joint_is_found():

@@ -16,7 +16,7 @@ from viewer.rig.inspection.faults import are_usable, bind_faults
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
 from viewer.rig.shape import rest_joints
-from viewer.rig.skeleton import joint_labels
+from viewer.rig.skeleton import Skeleton, joint_labels
 from viewer.rig.skin import moves_vertices
 
 # Fraction of the figure's size: smaller differences are rounding errors of old files.
@@ -42,11 +42,7 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Find
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return
-    # If the position of a joint is unknown, so are the positions of the joints below it.
-    known = subject.valid("joints", skeleton.n_joints)
-    for joint, parent in enumerate(skeleton.parents.tolist()):
-        known[joint] &= parent < 0 or bool(known[parent])
-    known &= usable
+    known = _placed(subject, skeleton) & usable
     matrices = np.where(usable[:, None, None], skin.inverse_bind, np.eye(4))
     bound = np.linalg.inv(matrices)[:, :3, 3]
     own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
@@ -70,12 +66,20 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Find
     )
 
 
+def _placed(subject: Subject, skeleton: Skeleton) -> Bools:
+    """Return the joints whose place at rest is known: they and those above are valid: (J,)."""
+    known = subject.valid("joints", skeleton.n_joints)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        known[joint] &= parent < 0 or bool(known[parent])
+    return known
+
+
 def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
     """Report single joints that rotate the mesh at rest, while most do not."""
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or skeleton is None or figure.mesh is None:
         return
-    known = subject.valid("joints", skeleton.n_joints) & usable
+    known = _placed(subject, skeleton) & usable
     used = np.flatnonzero(moves_vertices(skin) & known)
     if len(used) < _SEVERAL:
         return
