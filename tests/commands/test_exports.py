@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
+from viewer.exporters import ExportOptions
 
 
 @pytest.fixture
@@ -52,6 +53,16 @@ def test_frames_and_rate_are_those_of_the_command(turning, tmp_path):
     ("settings", "error", "message"),
     [
         ({"path": "own.xyz"}, UnsupportedFormatError, "no motion exporter|no exporter"),
+        (
+            {"path": "own.glb", "options": ExportOptions(kind="bvh")},
+            UnsupportedFormatError,
+            r"^as bvh: expected a name with \.bvh, found .*own\.glb$",
+        ),
+        (
+            {"options": ExportOptions(kind="bhv")},
+            UnsupportedFormatError,
+            '^no exporter is called "bhv"; did you mean ',
+        ),
         ({"frames": range(0, 4, 2)}, ViewerError, "^frames: expected a step of 1, found 2"),
         ({"frames": range(9)}, ViewerError, "^frames: expected a range within 0:4"),
         ({"frames": range(2), "time": 1.0}, ViewerError, "^frames and --time: expected one"),

@@ -59,6 +59,7 @@ from viewer.exporters._motion_paths import PERSON, is_together, motion_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
 from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
+from viewer.near_names import name_hint
 from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.rig.geometry.vectors import SignedUp
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
@@ -369,6 +370,7 @@ def selected(
     # Animations keep their own keys where the format holds them; other motions are sampled. Without
     # a motion, or if one pose is requested, the current poses are written: as a motion of one frame
     # if the format holds nothing else.
+    _check_kind(options.kind, output)  # of Python; the command's is checked before files are read
     frames = asked.frames
     if _keeps_keys(options.kind, frames, output, scene):
         options = replace(options, gaps="", meta=VrmMeta())
@@ -437,9 +439,12 @@ def _requested_frames(frames: Frames, actor: Actor) -> tuple[int, int | None] | 
 
 
 def _check_kind(kind: str, output: Path) -> None:
-    """Raise for a file name whose suffix the requested exporter does not write."""
+    """Raise for an unknown exporter, or a file name whose suffix it does not write."""
     if not kind:
         return
+    if kind not in EXPORTERS:
+        hint = name_hint(kind, EXPORTERS)
+        raise UnsupportedFormatError(f'no exporter is called "{printable(kind, 60)}"; {hint}')
     known, suffix = EXPORTERS[kind].suffixes, output.suffix.lower() or "/"
     if suffix not in known:
         raise UnsupportedFormatError(
