@@ -202,9 +202,9 @@ def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size
     used = np.flatnonzero(total > 0.0)
     middles = np.stack(sums, axis=1)[used] / total[used, None]
     # Distance of the middle of each joint's vertices from the bones of every joint.
-    every = np.tile(used, len(used))
-    across = bone_distances(places, parents, np.repeat(middles, len(used), axis=0), every)
-    across = across.reshape(len(used), len(used))
+    across = np.zeros((len(used), len(used)))
+    for column, joint in enumerate(used):
+        across[:, column] = bone_distances(places, parents, middles, np.full(len(used), joint))
     own = np.diag(across)
     elsewhere = (own[:, None] > _OTHER_LIMB * size) & (across < _NEARER * own[:, None])
     first, second = np.nonzero(elsewhere & elsewhere.T)
