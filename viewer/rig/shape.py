@@ -67,10 +67,18 @@ def shaped_skeleton(figure: Figure, weights: Floats) -> Skeleton:
     Morph targets of glTF and FBX files leave the joints in place, and their sums over large meshes
     are expensive.
     """
+    return (shaped(figure, weights) if _moves_joints(figure) else figure).require_skeleton()
+
+
+def shaped_skin(figure: Figure, weights: Floats) -> Skin:
+    """Return the skin of ``shaped(figure, weights)``; see ``shaped_skeleton``."""
+    return (shaped(figure, weights) if _moves_joints(figure) else figure).require_skin()
+
+
+def _moves_joints(figure: Figure) -> bool:
+    """Return whether blend shapes may move the rest joints."""
     shapes = figure.blend_shapes
-    if figure.joint_regressor is None and (shapes is None or shapes.space is None):
-        return figure.require_skeleton()
-    return shaped(figure, weights).require_skeleton()
+    return figure.joint_regressor is not None or (shapes is not None and shapes.space is not None)
 
 
 def _with_joints(figure: Figure, joints: Floats, shifts: Floats) -> Figure:

@@ -22,7 +22,7 @@ from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
-from viewer.rig.shape import pose_weights, rest_joints, shaped, shaped_skeleton
+from viewer.rig.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
 from viewer.rig.skin import Skin, bind_positions, owners
 from viewer.rig.skinning import Skinning
 from viewer.rig.skinning.dqs import split_palette
@@ -74,9 +74,7 @@ def tracks_of(figure: Figure, poses: Sequence[Pose | None], how: Skinning) -> Tr
         posed = posed_skeleton(shaped_skeleton(figure, pose.shape_weights), pose)
         joints[frame] = posed.world[:, :3, 3]
         if n_bound:
-            own = shaped(figure, pose.shape_weights).skin
-            assert own is not None  # as the unshaped figure
-            matrices[frame] = posed.palette(own)
+            matrices[frame] = posed.palette(shaped_skin(figure, pose.shape_weights))
     binds = np.zeros((0, 3)) if skin is None or not n_bound else bind_positions(skin)
     flat = matrices.reshape(-1, 4, 4)
     duals, stretches = split_palette(flat, np.tile(binds, (len(poses), 1)))
@@ -84,26 +82,33 @@ def tracks_of(figure: Figure, poses: Sequence[Pose | None], how: Skinning) -> Tr
     align_signs(rotations)
     places = np.einsum("fjab,jb->fja", matrices[..., :3, :3], binds) + matrices[..., :3, 3]
     upper = stretches[:, *np.triu_indices(3)].reshape(len(poses), n_bound, 6)
-    offsets = None if figure.mesh is None else _offsets(figure, rest, poses, weights, how)
+    fine = FINE * size_of(rest)
+    offsets = None if figure.mesh is None else _offsets(figure, poses, weights, how, fine)
     return Tracks(rest, offsets, model, rotations, places, upper, joints)
 
 
 def _offsets(
     figure: Figure,
-    rest: Figure,
     poses: Sequence[Pose | None],
     weights: Sequence[Floats],
     how: Skinning,
+    tolerance: float,
 ) -> Fields:
     """Return how shapes and pose correctives displace the rest vertices in each pose."""
-    mesh, base = figure.require_mesh(), rest.require_mesh()
+    mesh, blend = figure.require_mesh(), figure.blend_shapes
     columns, displacements = list[Floats](), list[Callable[[Floats], Floats]]()
-    rows, row_of = np.unique(np.stack(weights), axis=0, return_inverse=True)
-    if len(rows) > 1 and figure.blend_shapes is not None:
+    changes = np.stack(weights) - weights[0]
+    if not changes.any() or blend is None:
+        pass  # the shape is that of ``rest``
+    elif blend.is_linear and blend.rules is None:
+        columns.append(changes)
+        displacements.append(blend.displacement)
+    else:
         # The displacement of each shape that occurs: rules and shape spaces need not be linear.
-        shapes = np.stack([shaped(figure, row).require_mesh().positions for row in rows])
-        shapes -= base.positions
-        columns.append(np.eye(len(rows))[row_of.reshape(-1)])
+        rows, row_of = np.unique(np.stack(weights), axis=0, return_inverse=True)
+        shapes, used = np.stack([blend.displacement(row) for row in rows]), row_of.reshape(-1)
+        shapes -= shapes[used[0]].copy()
+        columns.append(np.eye(len(rows))[used])
         displacements.append(lambda some: np.einsum("s,sva->va", some, shapes))
     correctives, skeleton = figure.correctives, figure.skeleton
     if correctives is not None and skeleton is not None and how.correctives:
@@ -125,7 +130,7 @@ def _offsets(
         total: Floats = np.sum([displace(own) for displace, own in parts], axis=0)
         return total
 
-    return principal_fields(np.concatenate(columns, axis=1), displacement, FINE * size_of(rest))
+    return principal_fields(np.concatenate(columns, axis=1), displacement, tolerance)
 
 
 def size_of(figure: Figure) -> float:
