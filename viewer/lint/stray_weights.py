@@ -116,17 +116,21 @@ def _are_far(
     own: Indices,
     least: float,
 ) -> Bools:
-    """Return which parts, of given rows, are apart in space from the joint's own vertices: (N,)."""
+    """Return which parts, given by all their rows, are apart in space from ``own`` rows: (N,)."""
     # The blade of a sword and the hem of a cape are parts far from their joint, but next to others
     # that it moves.
     far = np.zeros(len(parts), dtype=np.bool_)
-    for part in np.unique(parts[rows]).tolist():
-        members = np.flatnonzero(parts == part)
-        others = own[found.joints[own] == found.joints[members[0]]]
+    if len(rows) == 0:
+        return far
+    joints = found.joints[own]
+    near = {joint: points[own[joints == joint]] for joint in np.unique(found.joints[rows]).tolist()}
+    rows = rows[np.argsort(parts[rows], kind="stable")]
+    for members in np.split(rows, np.flatnonzero(np.diff(parts[rows])) + 1):
+        others = near[int(found.joints[members[0]])]
         gap = np.inf
         for start in range(0, len(members), _TOGETHER):
             some = points[members[start : start + _TOGETHER], None]
-            gap = min(gap, float(np.linalg.norm(some - points[others], axis=2).min(initial=gap)))
+            gap = min(gap, float(np.linalg.norm(some - others, axis=2).min(initial=gap)))
         far[members] = gap > least
     return far
 
