@@ -17,15 +17,12 @@ from viewer.progress import Cancelled, receiving
 from viewer.rig.pose import rest_pose
 from viewer.rig.skinning import deform, joint_matrices
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
-# With a sixteenth of the usual number of points, a fit is much faster and nearly as good.
-SAMPLES = 125
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
 
 def aligned(figure, target, fits=True, **settings):
-    settings = {"samples": SAMPLES, **settings}
     pose = rest_pose(figure.skeleton)
     return align_posed(figure, pose, target, AlignmentSettings(**settings), fits), pose
 
