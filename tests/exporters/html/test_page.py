@@ -145,9 +145,13 @@ def test_shapes_and_correctives_move_the_rest_vertices(browser, tmp_path):
     correctives = viewer.rig.blendshapes.Correctives(random.normal(size=(27, 90, 3)) * 0.05)
     figure = replace(plain, blend_shapes=shapes, correctives=correctives)
     weights = random.normal(size=(5, 3))
-    (animation,), _ = write(tmp_path / "a.html", moving(figure, shapes=weights))
+    (animation,), notes = write(tmp_path / "a.html", moving(figure, shapes=weights))
     browser.open(tmp_path / "a.html")
     check_frames(browser, animation, Skinning(), [0, 1, 4])
+    kept = "surfaces keep their first normals while blend shapes change"
+    assert notes.count(kept) == 1
+    _, notes = write(tmp_path / "b.html", moving(figure, shapes=weights[:1].repeat(5, axis=0)))
+    assert kept not in notes
 
 
 @needs_chromium

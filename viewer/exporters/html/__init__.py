@@ -163,6 +163,9 @@ class _Shown:
             }
         if figure.mesh is not None and figure.mesh.n_vertices:
             packed["mesh"], center = pack_mesh(self.tracks, actor.hidden_parts, packer, notes)
+            shapes = [pose.shape_weights for pose in self.poses if pose is not None]
+            if not all(np.array_equal(each, shapes[0]) for each in shapes):
+                notes.append("surfaces keep their first normals while blend shapes change")
             if figure.is_attached:
                 packed["skin"] = pack_skin(rest.require_skin(), how, packer)
                 packed["skin"]["isAffine"] = "stretches" in packed["motion"]
