@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.autorig.alignment.orientation_search import AXES
-from viewer.autorig.alignment.surface_alignment import DEFAULT_UP, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings, stated_up
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
@@ -324,8 +324,6 @@ def _settings(
     arguments: argparse.Namespace, template: Actor, output: Path | None, target_up: Up
 ) -> TransferSettings:
     """Return the requested settings; the .skel format cannot store correctives."""
-    if arguments.up is None and target_up != DEFAULT_UP:
-        arguments.up = target_up  # the file says so
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)
@@ -335,7 +333,12 @@ def _settings(
     settings = settings_of(
         TransferSettings,
         arguments,
-        alignment=settings_of(AlignmentSettings, arguments, landmarks=landmarks),
+        alignment=settings_of(
+            AlignmentSettings,
+            arguments,
+            landmarks=landmarks,
+            up=arguments.up or stated_up(target_up),
+        ),
         weights=settings_of(WeightSettings, arguments, match=settings_of(MatchSettings, arguments)),
     )
     if arguments.skeleton and arguments.method is None:

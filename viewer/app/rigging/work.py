@@ -32,9 +32,9 @@ from viewer.app.rigging.rigging import (
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import (
-    DEFAULT_UP,
     AlignmentSettings,
     alignment_lines,
+    stated_up,
 )
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
@@ -204,9 +204,9 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
 def _search_settings(state: AppState) -> AlignmentSettings:
     choices, target = state.of(Rigging).choices, state.of(Rigging).target
-    stated = "" if target is None or target.figure.up == DEFAULT_UP else target.figure.up
+    stated = None if target is None else stated_up(target.figure.up)
     return AlignmentSettings(
-        up=choices.up or stated or None,
+        up=choices.up or stated,
         facing=choices.facing or None,
         scale=choices.scale,
         refines=choices.refines,

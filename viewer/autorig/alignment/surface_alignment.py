@@ -27,6 +27,7 @@ from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats, Ints, freeze_fields
+from viewer.rig.geometry.vectors import Up
 
 AlignedBy: TypeAlias = Literal["in place", "search", "landmarks", "given", "fit"]
 TemplateScale: TypeAlias = Literal["uniform", "axes", "none"]
@@ -53,6 +54,11 @@ PART = 0.05
 # Fraction of the size to which larger distances, as of hair or a missing hand, are clamped.
 _CAP = 0.05
 _BAD = 0.03  # ratio of RMS error to size above which a warning is given
+
+
+def stated_up(file_up: Up) -> str | None:
+    """Return the up axis of a target that its file states; None for the one assumed otherwise."""
+    return None if file_up == DEFAULT_UP else file_up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
