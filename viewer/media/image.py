@@ -181,6 +181,11 @@ def _open(data: bytes) -> Image.Image:
     return Image.open(io.BytesIO(data), formats=_FORMATS)
 
 
+def media_type(data: bytes) -> str:
+    """Return the media type of the bytes of a PNG or JPEG file."""
+    return "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+
+
 def save_image(path: Path, pixels: Bytes) -> int:
     """Write (H, W, 4) uint8 pixels in the suffix's format, by default PNG; return the size."""
     from viewer.media.saving import save_bytes

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError
+from viewer.media.image import media_type
 from viewer.rig.file_record import Json
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
@@ -121,9 +122,12 @@ class Document:
 
     def picture(self, data: bytes, name: str) -> int:
         """Add an image, the bytes of a PNG or JPEG file, once; return its index in ``images``."""
-        kind = "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
         if data not in self._pictures:
-            image = {"name": text_of(name), "mimeType": kind, "bufferView": self._view(data, 0)}
+            image = {
+                "name": text_of(name),
+                "mimeType": media_type(data),
+                "bufferView": self._view(data, 0),
+            }
             self._pictures[data] = self.add("images", image)
         return self._pictures[data]
 

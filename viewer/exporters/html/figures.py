@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.exporters.html.motion import FINE, Tracks, size_of
 from viewer.exporters.html.packing import Packer
+from viewer.media.image import media_type
 from viewer.media.png import encode_png
 from viewer.rendering.gpu.index_sets import split_vertices, triangle_order
 from viewer.rendering.gpu.surfaces import (
@@ -169,7 +170,7 @@ def _picture(texture: Texture) -> tuple[bytes, str]:
     data = None if "mirror" in texture.wrap else texture.encoded
     if data is None:
         data = encode_png(joined_image(texture.image, texture.wrap))
-    return data, "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+    return data, media_type(data)
 
 
 def plain(name: str, value: object) -> object:
