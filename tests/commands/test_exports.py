@@ -65,7 +65,7 @@ def test_frames_and_rate_are_those_of_the_command(turning, tmp_path):
         ),
         ({"frames": range(0, 4, 2)}, ViewerError, "^frames: expected a step of 1, found 2"),
         ({"frames": range(9)}, ViewerError, "^frames: expected a range within 0:4"),
-        ({"frames": range(2), "time": 1.0}, ViewerError, "^frames and --time: expected one"),
+        ({"frames": range(2), "time": 1.0}, ViewerError, "^frames and time: expected one"),
     ],
 )
 def test_requests_that_cannot_be_met_are_refused(turning, tmp_path, settings, error, message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -23,6 +24,8 @@ from viewer.rendering.options import SIZE, DisplayOptions, Quality
 from viewer.rig.arrays import Bytes
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor, Scene, scene_points
+
+_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
 
 
 def render(
@@ -246,10 +249,11 @@ def without_dashes() -> Iterator[None]:
     try:
         yield
     except ViewerError as problem:
-        text = str(problem)
-        if not text.startswith("--"):
+        text = str(problem).removeprefix("--scalar ")
+        named = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
+        if named == str(problem):
             raise
-        raise type(problem)(text.removeprefix("--").removeprefix("scalar ")) from None
+        raise type(problem)(named) from None
 
 
 def check_choices(options: DisplayOptions) -> None:
