@@ -82,7 +82,7 @@ _ONLY: dict[str, tuple[TransferMethod, ...]] = {
     "smoothing": ("robust", "heat", "voxel"),
     "max_influences": ("robust", "heat", "voxel"),
 }
-"""Methods with an option; all other options are those of the first."""
+"""Methods that use an option; the options not listed are for ``robust`` only."""
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
 _GAP = 1.2  # distance of the template from other actors, relative to its width
 _FEWEST = 3  # minimum number of landmarks
