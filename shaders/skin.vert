@@ -54,7 +54,7 @@ vec4 palette_row(int joint, int row) {
 }
 
 #ifdef AFFINE_PALETTE
-const float RIGID = 1e-5;  // relative tolerance of A^T A = s^2 I, as in viewer/rig/kinematics.py
+const float RIGID = 1e-5;  // relative tolerance of A^T A = s^2 I, as in viewer/rigs/kinematics.py
 
 // Square of a joint's scale if it is uniform, and 0 for all others; rows of its matrix.
 float rigid_size(vec3 x, vec3 y, vec3 z) {

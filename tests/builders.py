@@ -7,7 +7,7 @@ import numpy as np
 from formats.synthetic_smpl import model
 
 import viewer
-from viewer.rig.figure import Figure
+from viewer.rigs.figure import Figure
 
 
 def rotation(vector) -> np.ndarray:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions, Part, Selection, export
-from viewer.rig.captures.sampled_points import SampledPoints
-from viewer.rig.figure import Figure
-from viewer.rig.motion.animation_choice import own_animations
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.sampled_points import SampledPoints
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.animation_choice import own_animations
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.scene import Actor, Scene
 
 
 def export_frames(

@@ -12,6 +12,8 @@ import pytest
 from house import reached
 from sources import parsed
 
+import viewer
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
 WIDE = {"Exception", "BaseException"}  # types that nearly every problem has
@@ -33,18 +35,18 @@ EVERYWHERE = {
     "version",
 }
 PARTS = {
-    "rig": set(),
-    "autorig": {"rig"},
-    "media": {"rig", "interrupts", "streams"},
-    "formats": {"media", "rig", "interrupts", "streams"},
-    "rendering": {"rig", "interrupts", "resources"},
-    "exporters": {"autorig", "formats", "media", "rendering", "rig", "interrupts"},
-    "loading": {"formats", "models", "rig", "interrupts"},
+    "rigs": set(),
+    "autorig": {"rigs"},
+    "media": {"rigs", "interrupts", "streams"},
+    "formats": {"media", "rigs", "interrupts", "streams"},
+    "rendering": {"rigs", "interrupts", "resources"},
+    "exporters": {"autorig", "formats", "media", "rendering", "rigs", "interrupts"},
+    "loading": {"formats", "models", "rigs", "interrupts"},
     "app": {
-        *("autorig", "exporters", "formats", "lint", "loading", "manual", "media", "models"),
-        *("rendering", "rig", "interrupts", "resources"),
+        *("autorig", "exporters", "formats", "linting", "loading", "manual", "media", "models"),
+        *("rendering", "rigs", "interrupts", "resources"),
     },
-    "lint": {"loading", "formats", "rig"},
+    "linting": {"loading", "formats", "rigs"},
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts", "media", "resources"},
@@ -52,7 +54,7 @@ PARTS = {
         "batching",
         "models",
         "resources",
-        "rig",
+        "rigs",
     },  # otherwise the names of ``viewer.__all__``
     "interrupts": set(),
     "resources": set(),
@@ -230,6 +232,13 @@ def test_standard_dataclass_decorator_is_not_used():
 def test_every_public_module_documents_itself():
     for path in SOURCES:
         assert ast.get_docstring(parsed(path)), path
+
+
+def test_no_module_has_the_name_of_a_public_function():
+    """Importing the module would replace the function in ``viewer``."""
+    modules = {part_of(path) for path in SOURCES if path.parent != PACKAGE or path.stem[0] != "_"}
+    functions = {*viewer.__all__, "rig", "lint", "diff", "clean", "retarget", "widget"}
+    assert not functions & modules
 
 
 def test_shaders_state_their_version_and_use_name_prefixes():

@@ -204,7 +204,7 @@ def test_interrupted_video_keeps_the_old_file(end, number, moment):
         (INFO, "import viewer.formats.skin as m\nbefore(m, 'read')"),
         (INFO, "import viewer.commands._scene as m\nafter(m, 'begin')"),
         ((("lint",), {}), "import viewer.commands.lint as m\nbefore(m, 'lint_files')"),
-        (OBJ, "import viewer.rig.skinning as m\nbefore(m, 'deform')"),
+        (OBJ, "import viewer.rigs.skinning as m\nbefore(m, 'deform')"),
         (PNG, "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"),
         (PNG, "import os\nbefore(os, 'fsync')"),
         (OBJ, "import tempfile\nbefore(tempfile, 'mkstemp')"),

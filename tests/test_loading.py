@@ -10,8 +10,8 @@ import viewer
 from viewer.errors import FormatError, RigError
 from viewer.formats import KNOWN
 from viewer.loading import bundled_files
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import actor_points
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import actor_points
 
 ANY = KNOWN
 MATRIX = "matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } "

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rig.motion.evaluation import pose_actors
+from viewer.rigs.motion.evaluation import pose_actors
 
 BVH = """HIERARCHY
 ROOT pelvis
@@ -195,7 +195,7 @@ def test_bvh_that_drives_no_model_is_a_separate_actor(tmp_path):
     scene = load(path, *write_rig(tmp_path))
     assert len(scene.actors) == 2
     assert any("shown separately" in text for text in scene.warnings)
-    boxes = [viewer.rig.scene.actor_points(actor) for actor in scene.actors]
+    boxes = [viewer.rigs.scene.actor_points(actor) for actor in scene.actors]
     assert (
         boxes[0][:, 0].max() < boxes[1][:, 0].min() or boxes[1][:, 0].max() < boxes[0][:, 0].min()
     )

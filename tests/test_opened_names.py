@@ -13,7 +13,7 @@ from viewer.cli import run
 from viewer.formats import file_stem
 from viewer.loading import MotionSettings, bundled_files, load
 from viewer.media.file_names import folder_name, opened_text
-from viewer.rig.scene import Actor, free_title
+from viewer.rigs.scene import Actor, free_title
 
 BVH = """HIERARCHY
 ROOT pelvis

@@ -16,7 +16,7 @@ from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.rendering.gpu.program import SHADING
 from viewer.resources import resource
-from viewer.rig.skinning import METHODS
+from viewer.rigs.skinning import METHODS
 
 PACKAGE = Path(viewer.__file__).parent
 
@@ -32,7 +32,7 @@ def modules(folder: str) -> set[str]:
     ("folder", "registry"),
     [
         ("formats", FORMATS),
-        ("rig/skinning", METHODS),
+        ("rigs/skinning", METHODS),
         ("commands", COMMANDS),
         ("exporters", EXPORTERS),
         ("batching/engines", ENGINES),

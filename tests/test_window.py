@@ -24,8 +24,8 @@ from viewer.app.view.picks import vertex_at
 from viewer.app.window import Rest
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.inspection.front import guess_front
-from viewer.rig.scene import scene_points
+from viewer.rigs.inspection.front import guess_front
+from viewer.rigs.scene import scene_points
 
 pytestmark = pytest.mark.slow
 SHARED = ROOT.parent / "shared" / "data" / "cse169"

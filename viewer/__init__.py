@@ -28,23 +28,23 @@ if TYPE_CHECKING:
     from viewer.loading.own_arrays import animate, figure
     from viewer.rendering.camera import Camera
     from viewer.rendering.options import DisplayOptions, Light, Lights
-    from viewer.rig.blendshapes import BlendShapes
-    from viewer.rig.comparison.pose_errors import PoseErrors, pose_errors
-    from viewer.rig.figure import Figure
-    from viewer.rig.material import Material, Texture
-    from viewer.rig.mesh import Mesh
-    from viewer.rig.motion.actor_arrays import at, joints, vertices
-    from viewer.rig.motion.clip import Channel, Clip, evaluate, sample
-    from viewer.rig.motion.motion_arrays import MotionArrays, motion
-    from viewer.rig.motion.onion import onion
-    from viewer.rig.pose import Pose, rest_pose
-    from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
-    from viewer.rig.retargeting.mirror import mirror_pose
-    from viewer.rig.scene import Actor, Scene
-    from viewer.rig.shape import shaped, with_rest_mesh
-    from viewer.rig.skeleton import Skeleton
-    from viewer.rig.skin import Skin
-    from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices
+    from viewer.rigs.blendshapes import BlendShapes
+    from viewer.rigs.comparison.pose_errors import PoseErrors, pose_errors
+    from viewer.rigs.figure import Figure
+    from viewer.rigs.material import Material, Texture
+    from viewer.rigs.mesh import Mesh
+    from viewer.rigs.motion.actor_arrays import at, joints, vertices
+    from viewer.rigs.motion.clip import Channel, Clip, evaluate, sample
+    from viewer.rigs.motion.motion_arrays import MotionArrays, motion
+    from viewer.rigs.motion.onion import onion
+    from viewer.rigs.pose import Pose, rest_pose
+    from viewer.rigs.posing.pose_record import PoseRecord, apply_record, record_of
+    from viewer.rigs.retargeting.mirror import mirror_pose
+    from viewer.rigs.scene import Actor, Scene
+    from viewer.rigs.shape import shaped, with_rest_mesh
+    from viewer.rigs.skeleton import Skeleton
+    from viewer.rigs.skin import Skin
+    from viewer.rigs.skinning import Skinning, deform, deform_frames, joint_matrices
 
 __version__ = VERSION
 
@@ -100,53 +100,53 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Actor": "rig.scene",
-    "BlendShapes": "rig.blendshapes",
+    "Actor": "rigs.scene",
+    "BlendShapes": "rigs.blendshapes",
     "Camera": "rendering.camera",
-    "Channel": "rig.motion.clip",
-    "Clip": "rig.motion.clip",
+    "Channel": "rigs.motion.clip",
+    "Clip": "rigs.motion.clip",
     "DisplayOptions": "rendering.options",
-    "Figure": "rig.figure",
+    "Figure": "rigs.figure",
     "Light": "rendering.options",
     "Lights": "rendering.options",
-    "Material": "rig.material",
-    "Mesh": "rig.mesh",
-    "MotionArrays": "rig.motion.motion_arrays",
-    "Pose": "rig.pose",
-    "PoseErrors": "rig.comparison.pose_errors",
-    "PoseRecord": "rig.posing.pose_record",
+    "Material": "rigs.material",
+    "Mesh": "rigs.mesh",
+    "MotionArrays": "rigs.motion.motion_arrays",
+    "Pose": "rigs.pose",
+    "PoseErrors": "rigs.comparison.pose_errors",
+    "PoseRecord": "rigs.posing.pose_record",
     "Report": "batching.report",
-    "Scene": "rig.scene",
-    "Skeleton": "rig.skeleton",
-    "Skin": "rig.skin",
-    "Skinning": "rig.skinning",
-    "Texture": "rig.material",
+    "Scene": "rigs.scene",
+    "Skeleton": "rigs.skeleton",
+    "Skin": "rigs.skin",
+    "Skinning": "rigs.skinning",
+    "Texture": "rigs.material",
     "ViewerError": "errors",
     "animate": "loading.own_arrays",
-    "apply_record": "rig.posing.pose_record",
-    "at": "rig.motion.actor_arrays",
+    "apply_record": "rigs.posing.pose_record",
+    "at": "rigs.motion.actor_arrays",
     "batch": "commands._batch.calling",
-    "deform": "rig.skinning",
-    "deform_frames": "rig.skinning",
-    "evaluate": "rig.motion.clip",
+    "deform": "rigs.skinning",
+    "deform_frames": "rigs.skinning",
+    "evaluate": "rigs.motion.clip",
     "export": "commands._exports",
     "figure": "loading.own_arrays",
-    "joint_matrices": "rig.skinning",
-    "joints": "rig.motion.actor_arrays",
+    "joint_matrices": "rigs.skinning",
+    "joints": "rigs.motion.actor_arrays",
     "load": "loading",
-    "mirror_pose": "rig.retargeting.mirror",
-    "motion": "rig.motion.motion_arrays",
-    "onion": "rig.motion.onion",
-    "pose_errors": "rig.comparison.pose_errors",
-    "record_of": "rig.posing.pose_record",
+    "mirror_pose": "rigs.retargeting.mirror",
+    "motion": "rigs.motion.motion_arrays",
+    "onion": "rigs.motion.onion",
+    "pose_errors": "rigs.comparison.pose_errors",
+    "record_of": "rigs.posing.pose_record",
     "render": "commands._pictures",
-    "rest_pose": "rig.pose",
-    "sample": "rig.motion.clip",
-    "shaped": "rig.shape",
+    "rest_pose": "rigs.pose",
+    "sample": "rigs.motion.clip",
+    "shaped": "rigs.shape",
     "show": "app.window",
-    "vertices": "rig.motion.actor_arrays",
+    "vertices": "rigs.motion.actor_arrays",
     "video": "commands._pictures",
-    "with_rest_mesh": "rig.shape",
+    "with_rest_mesh": "rigs.shape",
     "write": "formats",
 }
 

@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from viewer.rig.scene import Scene
+    from viewer.rigs.scene import Scene
 
 SIZE = (480, 360)
 """Size of the pictures, pixels."""
@@ -17,7 +17,7 @@ def show_pictures() -> None:
     shell = sys.modules["IPython"].get_ipython()
     if shell is not None:
         pictures = shell.display_formatter.formatters["image/png"]
-        pictures.for_type_by_name("viewer.rig.scene", "Scene", picture)
+        pictures.for_type_by_name("viewer.rigs.scene", "Scene", picture)
 
 
 def picture(scene: Scene) -> bytes:

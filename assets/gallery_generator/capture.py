@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from gallery_generator.walk import Walk
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.timing import Timing
-from viewer.rig.pose import placement_matrix
-from viewer.rig.scene import Actor
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip, root_positions
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.pose import placement_matrix
+from viewer.rigs.scene import Actor
 
 __all__ = ["Person", "camera_at", "write_cameras", "write_frames"]
 

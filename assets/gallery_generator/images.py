@@ -11,10 +11,10 @@ from viewer.media.image import save_image
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Scene
 
 __all__ = ["write_images"]
 

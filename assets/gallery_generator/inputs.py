@@ -12,9 +12,9 @@ from gallery_generator.capture import Person, camera_at, write_cameras, write_fr
 from gallery_generator.images import write_images
 from gallery_generator.walk import Gait, walk
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.skin import Skin, owners
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.skin import Skin, owners
 
 __all__ = ["body_figure", "make_inputs", "spread", "without_weights"]
 

@@ -11,15 +11,15 @@ import numpy as np
 
 import viewer
 from gallery_generator.inputs import IMAGE, body_figure, spread, without_weights
-from viewer.lint import lint_scene, places_of
+from viewer.linting import lint_scene, places_of
 from viewer.media.image import decode_picture
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.overlay.annotation import Marks
-from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Bytes
-from viewer.rig.scene import Actor, Scene, scene_box, scene_points
-from viewer.rig.skin import limit_influences
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.scene import Actor, Scene, scene_box, scene_points
+from viewer.rigs.skin import limit_influences
 
 __all__ = ["COMMON", "PAPER", "PICTURES", "Picture"]
 

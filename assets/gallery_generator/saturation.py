@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 __all__ = ["MOST", "saturated_fraction"]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.posing.pose_vector import set_joint_rotations
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.skinning import deform
 
 __all__ = ["Gait", "Walk", "walk"]
 

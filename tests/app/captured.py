@@ -3,11 +3,11 @@
 import numpy as np
 
 import viewer
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 NAMES = ("nose", "left_eye", "right_eye", "neck")
 

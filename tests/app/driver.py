@@ -14,9 +14,9 @@ from viewer.phrases import in_window
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.gpu.context import thread_graphics
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.inspection.front import guess_front
-from viewer.rig.scene import Scene, scene_box, scene_points
-from viewer.rig.skeleton import find_dof
+from viewer.rigs.inspection.front import guess_front
+from viewer.rigs.scene import Scene, scene_box, scene_points
+from viewer.rigs.skeleton import find_dof
 
 MODIFIERS = {
     "ctrl": imgui.Key.mod_ctrl,

@@ -3,9 +3,9 @@
 import numpy as np
 
 from viewer.app.posing.posed_joint import posed_joint
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import Skeleton
 
 SIZE = (1280, 800)
 

@@ -3,11 +3,11 @@
 import numpy as np
 from autorig.rigged_shapes import arm, mesh_of, turn
 
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import deform
 
 SCALE, ROTATION, MOVE = 30.0, turn([0.1, 1, 0.2], 2.0), np.array([3.0, -4.0, 5.0])
 TRUE = np.eye(4)

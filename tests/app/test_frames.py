@@ -16,7 +16,7 @@ from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.toolbar import choose_tool
 from viewer.app.weights.weights_panel import pin_vertex, show_scalar
 from viewer.rendering.options import DisplayOptions
-from viewer.rig import kinematics
+from viewer.rigs import kinematics
 
 DRAFT, FINAL = DisplayOptions(), DisplayOptions(quality="final", passes=4)
 
@@ -83,7 +83,7 @@ def runs(monkeypatch):
         counted.extend([1] * (local.shape[1] if local.ndim == 4 else 1))
         return run(parents, local)
 
-    monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
+    monkeypatch.setattr("viewer.rigs.kinematics.forward_kinematics", count)
     return counted
 
 

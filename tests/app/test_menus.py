@@ -25,7 +25,7 @@ from viewer.app.recording.recording import KINDS, RecordSettings, ask_where
 from viewer.app.weights.weights_panel import Weights
 from viewer.app.window import awaits_tooltip
 from viewer.models import load_model_folder, save_model_folder
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 
 @pytest.fixture

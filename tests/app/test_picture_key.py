@@ -11,9 +11,9 @@ import viewer
 from viewer.app.pace import picture_key
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.annotation import Marks
-from viewer.rig.motion.clip_edit import clip_from_pose
-from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skinning import Skinning
+from viewer.rigs.motion.clip_edit import clip_from_pose
+from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.skinning import Skinning
 
 SIZE = (64, 48)
 
@@ -201,7 +201,7 @@ def test_restored_values_have_an_equal_key(state):
 def test_unchanged_scene_is_not_copied(state, monkeypatch):
     before = key_of(state, SIZE)
     monkeypatch.setattr("viewer.app.core.scene_version.copy.deepcopy", None)
-    monkeypatch.setattr("viewer.rig.pose.NumberKey", None)
+    monkeypatch.setattr("viewer.rigs.pose.NumberKey", None)
     assert key_of(state, SIZE) == before
 
 

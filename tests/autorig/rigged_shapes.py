@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import skin_from_entries
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import skin_from_entries
 
 HALF_TURN = np.pi
 

@@ -15,12 +15,12 @@ from viewer.autorig.weights.bone_weights import names_control
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import FileRecord
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import FileRecord
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skinning import deform
 
 
 def box(low, high, cells):

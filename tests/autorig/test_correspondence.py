@@ -19,8 +19,8 @@ from viewer.autorig.correspondence import (
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import nearest_vertices
 from viewer.errors import RigError
-from viewer.rig.geometry.closest_point import Surface
-from viewer.rig.mesh import volume
+from viewer.rigs.geometry.closest_point import Surface
+from viewer.rigs.mesh import volume
 
 FLAT = Template(
     np.array([[-9.0, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]), np.array([[0, 1, 2], [0, 2, 3]])

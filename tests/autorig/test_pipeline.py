@@ -15,13 +15,13 @@ from viewer.autorig.settings import METHODS, TransferSettings
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import deform
 
 pytestmark = pytest.mark.slow
 

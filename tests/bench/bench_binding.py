@@ -15,11 +15,11 @@ from scipy import sparse
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.rig.figure import Figure
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import ball_skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.hierarchy import depth_first
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skeleton import ball_skeleton
 
 CHARACTERS = Path(__file__).resolve().parents[3] / "shared" / "data" / "rigging"
 GOALS = {"heat": 0.6, "voxel": 0.8}

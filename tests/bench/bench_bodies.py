@@ -12,9 +12,9 @@ from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skinning import Skinning
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skinning import Skinning
 
 SIZE = bench_skinning.SIZE
 PIG = Path(__file__).resolve().parents[3] / "shared" / "data" / "pig" / "core_txt_files"

@@ -5,9 +5,9 @@ from bench_skinning import synthetic
 from measure import interleaved, median_ratio, report
 from scipy.sparse import csr_matrix
 
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.pose import rest_pose
-from viewer.rig.skinning.lbs import move
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skinning.lbs import move
 
 GOAL = 1.3
 FRAMES = 32

@@ -11,16 +11,16 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from lint.test_held_feet import MOTIONS, path_of, slides
+from linting.test_held_feet import MOTIONS, path_of, slides
 
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.loading.cleaning import clean_up
 from viewer.loading.settings import CleanUp
-from viewer.rig.feet.legs import legs_of
-from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import frames_of, world_frames
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.scene import Scene
+from viewer.rigs.feet.legs import legs_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.evaluation import frames_of, world_frames
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.scene import Scene
 
 NOTES = ("F007.feet-planted", "F007.feet-gap", "X006.locked")
 GROWTH, GOAL = 2.0, "knees accelerate at most twice as much, and lint finds no sliding"

@@ -16,10 +16,10 @@ from references.least_frame import LeastFrame
 import viewer
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.kinematics import forward_kinematics, world_matrices
-from viewer.rig.pose import local_matrices
-from viewer.rig.scene import Scene, scene_box
-from viewer.rig.skeleton import FIRST_ROTATION
+from viewer.rigs.kinematics import forward_kinematics, world_matrices
+from viewer.rigs.pose import local_matrices
+from viewer.rigs.scene import Scene, scene_box
+from viewer.rigs.skeleton import FIRST_ROTATION
 
 PIG = Path(__file__).resolve().parents[3] / "shared" / "data" / "pig" / "core_txt_files"
 SIZE = 1280, 720

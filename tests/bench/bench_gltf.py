@@ -17,7 +17,7 @@ from viewer.formats.gltf import read_nodes
 from viewer.loading import load
 from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 N_ANIMATIONS, N_JOINTS, N_KEYS, N_SIDE = 60, 70, 70, 120
 N_FACE, N_TARGETS = 160, 50

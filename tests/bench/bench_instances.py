@@ -24,9 +24,9 @@ from viewer.rendering.passes.material_runs import draw_runs
 from viewer.rendering.passes.mesh_pass import set_surface
 from viewer.rendering.view import View, set_lights, view_of
 from viewer.resources import resource
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skinning import Skinning
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skinning import Skinning
 
 SIZE, COUNT, GOAL = (1280, 720), 100, 1.15
 MOVING = {1: 1.3, 100: 1.5, 1000: 1.5}  # maximum ratio of moving to still frames, by number

@@ -13,10 +13,10 @@ import numpy as np
 from measure import interleaved, report
 
 import viewer
-from viewer.lint import lint_scene
+from viewer.linting import lint_scene
 from viewer.loading import bundled_body
 from viewer.progress import receiving
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 GOAL = 4.0
 N_FRAMES, RATE = 1000, 60.0

@@ -11,11 +11,11 @@ from measure import interleaved, report
 import viewer
 from viewer.exporters import ExportOptions
 from viewer.loading import bundled_body
-from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 FRAMES = 1000
 

@@ -13,10 +13,10 @@ from measure import interleaved, report
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 SIZE, MANY, GOAL = (640, 360), 20, 1.25
 _ROWS, _COLUMNS = 346, 174  # 60,204 vertices

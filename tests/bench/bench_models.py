@@ -13,8 +13,8 @@ from measure import interleaved, report, run_process
 import viewer
 from viewer.formats import Source
 from viewer.formats._archive.opening import open_archive
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.bodies.offsets import SparseOffsets
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.bodies.offsets import SparseOffsets
 
 GOAL = 1.5
 MEMORY_GOAL = 3.0

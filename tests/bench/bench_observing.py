@@ -14,10 +14,10 @@ from viewer.app.pace import picture_key
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 COUNT, N_FRAMES, RATE, SIZE = 300, 60, 30.0, (320, 200)
 GOAL = 0.2

@@ -21,7 +21,7 @@ from viewer.loading import bundled_body, bundled_files
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import QUALITIES, DisplayOptions
 from viewer.rendering.sampling import n_passes
-from viewer.rig.scene import Scene, scene_box
+from viewer.rigs.scene import Scene, scene_box
 
 SIZE = 1280, 720
 N_ONION = 6
@@ -33,7 +33,7 @@ import statistics, time, viewer
 from viewer.loading import bundled_body, bundled_files
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import scene_box
+from viewer.rigs.scene import scene_box
 times = []
 with Offscreen() as offscreen, offscreen.context:
     for files in (bundled_files(), [bundled_body()]):

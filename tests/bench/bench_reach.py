@@ -17,11 +17,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from viewer.loading import bundled_body, load
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import Pose, dof_rotations, rest_pose
-from viewer.rig.posing.inverse_kinematics import Reaching, chain_above, reach
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import Pose, dof_rotations, rest_pose
+from viewer.rigs.posing.inverse_kinematics import Reaching, chain_above, reach
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 STEP, COUNT, SEEDS = 0.01, 250, 4
 GOAL = 4.0  # milliseconds of processor time, mean

@@ -9,13 +9,13 @@ from measure import interleaved, report
 import viewer
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin
 
 SIZE = 1280, 720
 GOAL = 1.2

@@ -12,7 +12,7 @@ import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import Scene, scene_box
+from viewer.rigs.scene import Scene, scene_box
 
 SIZE, ROUNDS = (1280, 720), 30
 

@@ -25,8 +25,8 @@ from viewer.autorig.weights.weight_transfer import (
     nearest_weights,
     transferred_weights,
 )
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.skin import Skin, skin_from_entries
 
 # A template in a different pose, which the complete pipeline fits, does not test only the weights.
 UNFITTED = {"aligned": {"bent by 4 degrees"}}

@@ -5,8 +5,8 @@ channels is compared with a loop that evaluates one channel at a time with numpy
 import numpy as np
 from measure import interleaved, report
 
-from viewer.rig.geometry.quaternion import slerp
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
+from viewer.rigs.geometry.quaternion import slerp
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
 
 N_JOINTS, N_KEYS, N_CALLS = 70, 100, 10
 GOAL = 0.1  # milliseconds for all channels at one time

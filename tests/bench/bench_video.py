@@ -22,9 +22,9 @@ from viewer.media.video import VideoSink
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.recorder import Recording, Sink, record
-from viewer.rig.arrays import Bytes
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.scene import Actor, Scene
 
 SIZE = 1280, 720
 N_FRAMES, RATE = 60, 30.0

@@ -16,12 +16,12 @@ from exporting import export_frames
 
 import viewer
 from viewer.exporters import ExportOptions, export
-from viewer.rig.geometry.quaternion import multiply
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.geometry.quaternion import multiply
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 FRAMES, RATE = 32, 30.0  # one stride
 # From metres with y up to centimetres.
@@ -225,8 +225,8 @@ def walk(figure: viewer.Figure, what: str) -> SampledClip:
         down[names.index("right_shoulder"), 2] = 1.2
         quaternions = multiply(quaternions, turns_to_quaternions(down))
     else:
-        from viewer.rig.geometry.rotation import matrix_to_quaternion
-        from viewer.rig.pose import joint_rotations
+        from viewer.rigs.geometry.rotation import matrix_to_quaternion
+        from viewer.rigs.pose import joint_rotations
 
         at_rest = matrix_to_quaternion(joint_rotations(figure.skeleton, rest))
         quaternions = multiply(at_rest, quaternions)

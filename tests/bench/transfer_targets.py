@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 import viewer
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.skin import skin_from_entries
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.skin import skin_from_entries
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 TURN = np.radians(115.0)

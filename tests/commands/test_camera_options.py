@@ -16,7 +16,7 @@ from viewer.commands._view import ViewOptions, add_camera_arguments, camera_of
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.pinhole import frustum_corners
-from viewer.rig.scene import scene_points
+from viewer.rigs.scene import scene_points
 
 pytestmark = pytest.mark.slow
 _QUICK = ("--quality", "draft", "--force")
@@ -168,7 +168,7 @@ def test_whole_motion_is_visible_between_the_panels_of_an_image(tmp_path):
     from viewer.rendering.framing import frame_motion
     from viewer.rendering.options import DisplayOptions
     from viewer.rendering.recorder import Recording
-    from viewer.rig.scene import scene_box
+    from viewer.rigs.scene import scene_box
 
     scene = people(write_rig(tmp_path), [True] * 12)
     state = AppState(scene, Camera(), DisplayOptions(samples=1), scene_box(scene))

@@ -9,7 +9,7 @@ from app.tiny import write_rig
 from formats import skel_text, skin_text
 
 from viewer.cli import run
-from viewer.lint import CODES
+from viewer.linting import CODES
 from viewer.loading import bundled_files
 
 

@@ -15,7 +15,7 @@ import viewer
 from viewer.cli import run
 from viewer.commands._view import ViewOptions, camera_of
 from viewer.media.video import VideoSink
-from viewer.rig.scene import scene_points
+from viewer.rigs.scene import scene_points
 
 _SMALL = ("--size", "160x120", "--quality", "draft", "--no-grid", "--background", "white")
 

@@ -8,7 +8,7 @@ from exporters.small_rigs import ARMS_SKEL, LOPSIDED_SKEL, clip_text, write_box,
 from formats.synthetic_smpl import model
 
 from viewer.cli import run
-from viewer.rig.scalars import SCALARS
+from viewer.rigs.scalars import SCALARS
 
 pytestmark = pytest.mark.slow
 

@@ -13,11 +13,11 @@ from viewer.errors import FormatError
 from viewer.exporters import export
 from viewer.formats import Source
 from viewer.loading import bundled_body
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
@@ -320,7 +320,7 @@ def landmarks(tmp_path, text):
 
 
 def test_landmarks_are_points_or_posed_joints(tmp_path):
-    from viewer.rig.skinning import joint_matrices
+    from viewer.rigs.skinning import joint_matrices
 
     actor = viewer.load().actors[0]
     found = landmarks(tmp_path, "1 2 3 4 5 6\nhead 7 8 9\n-1 0 0 1e1 0 0\n")

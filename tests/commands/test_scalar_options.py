@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 from PIL import Image
-from rig.hand_made import mesh
+from rigs.hand_made import mesh
 
 from viewer.cli import run
 from viewer.commands._scalar import scalar_notes
 from viewer.errors import ViewerError
 from viewer.rendering.options import DisplayOptions
 from viewer.resources import resource
-from viewer.rig.annotations import VertexField
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene
 
 pytestmark = pytest.mark.slow
 

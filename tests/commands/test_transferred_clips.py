@@ -8,11 +8,11 @@ import viewer
 from viewer.cli import run
 from viewer.exporters import export
 from viewer.formats import write
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.motion.clip_edit import clip_from_frames
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Actor
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.motion.clip_edit import clip_from_frames
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Actor
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 

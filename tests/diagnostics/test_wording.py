@@ -14,9 +14,9 @@ from viewer.batching.execution import attempt
 from viewer.batching.items import Item
 from viewer.diagnostics import CODES, Diagnostic, Phrase, described, wording
 from viewer.diagnostics.record import note_found
-from viewer.lint import Finding, describe
+from viewer.linting import Finding, describe
 from viewer.phrases import Remedy, counted, in_window, listed, optional
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 ROOT = Path(viewer.__file__).parent
 KEY = re.compile(r"([A-Z]\d{3}\.[a-z0-9-]+): (.+)", re.DOTALL)

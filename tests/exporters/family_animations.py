@@ -4,13 +4,13 @@ import numpy as np
 from builders import rotation
 from plain_smpl import smpl_forward
 
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.figure import Figure
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:

@@ -7,8 +7,8 @@ from plain_gltf import Gltf
 
 import viewer
 from viewer.exporters import export
-from viewer.rig.figure import Figure
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.skinning import Skinning, deform
 
 SINGLE = 2e-6  # relative to the size, for single precision through a chain of matrices
 EXACT = 1e-6  # for figures of a size of about 1

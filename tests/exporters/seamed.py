@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
 
 # A roof of three triangles; vertex 1 is on the seam, and vertex 4 is in no triangle.
 POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 1], [3, 3, 3]], dtype=float)

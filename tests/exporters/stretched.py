@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from viewer.rig.blendshapes import BlendShapes, JointRegressor
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.blendshapes import BlendShapes, JointRegressor
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
 
 NAMES = ("low", "middle", "high")
 JOINTS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0]])

@@ -20,9 +20,9 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.exporters import ExportOptions, exporters_of
 from viewer.formats import Source, read
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 
 # In metres and radians, for angles recovered by an arctangent of values near 1.
 ATOL = 1e-13

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from exporting import export_frames
 from numpy.testing import assert_allclose, assert_array_equal
-from rig import hand_made
+from rigs import hand_made
 
 import viewer
 from viewer.errors import OutputError, RigError
 from viewer.exporters import ExportOptions, exporters_of
 from viewer.formats import Source, read
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip, evaluate_all
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip, evaluate_all
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cse169"
 TINY = 1e-12

@@ -15,8 +15,8 @@ from numpy.testing import assert_allclose
 from viewer.errors import OutputError, RigError
 from viewer.exporters import ExportOptions, easymocap, exporters_of
 from viewer.formats import Source, read
-from viewer.rig.motion.body_motion import body_clip
-from viewer.rig.motion.sampled_clip import joined
+from viewer.rigs.motion.body_motion import body_clip
+from viewer.rigs.motion.sampled_clip import joined
 
 ATOL = 1e-6  # in metres and radians, for seven decimals summed along an arm
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55, "mano": 16}
@@ -102,8 +102,8 @@ def test_motion_round_trips_through_amass(family, tmp_path, kind):
 
 
 def animation_of_clip(figure, clip):
-    from viewer.rig.motion.sampled_animation import sample_animation
-    from viewer.rig.scene import Actor
+    from viewer.rigs.motion.sampled_animation import sample_animation
+    from viewer.rigs.scene import Actor
 
     return sample_animation(Actor(figure, clip=clip))
 
@@ -268,8 +268,8 @@ def test_figures_of_other_families_are_refused(tmp_path):
 
 def body_less(figure):
     """Return a clip of one frame at rest."""
-    from viewer.rig.motion.sampled_clip import SampledClip
-    from viewer.rig.motion.timing import Timing
+    from viewer.rigs.motion.sampled_clip import SampledClip
+    from viewer.rigs.motion.timing import Timing
 
     rotations = np.tile([0.0, 0, 0, 1], (1, figure.skeleton.n_joints, 1))
     return SampledClip("rest", Timing(30.0, np.arange(1)), rotations)

@@ -22,19 +22,19 @@ from viewer.exporters.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, bvh
 from viewer.formats.bvh.text import safe_names
 from viewer.loading import bundled_body
-from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.retarget import retarget
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.constraints.constraint import Constraint
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.evaluation import world_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.retarget import retarget
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton, ball_skeleton
+from viewer.rigs.skin import skin_from_lists
 
 TENTH = 1e-5  # in metres, 0.01 mm
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
@@ -213,7 +213,7 @@ def test_rest_frame_is_first(body, tmp_path):
 def test_offsets_are_those_of_the_shape(body, tmp_path):
     animation = body_animation(body)
     found, _ = write(animation, tmp_path)
-    shaped = viewer.rig.shape.shaped(body, animation.frames.shape_weights[0]).skeleton
+    shaped = viewer.rigs.shape.shaped(body, animation.frames.shape_weights[0]).skeleton
     for name, offset in list(zip(found.names, found.offsets, strict=True))[1:]:
         joint = body.skeleton.names.index(name)
         np.testing.assert_allclose(offset, 100 * shaped.rest_translations[joint], atol=1e-6)
@@ -557,7 +557,7 @@ def test_end_sites_of_the_bundled_body_are_on_its_skin(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
     found, _ = write(body_animation(figure, 2), tmp_path, unit="m")
     head = found.ends[found.names.index("head")]
-    top = figure.mesh.positions[:, 1].max() - viewer.rig.shape.rest_joints(figure)[15, 1]
+    top = figure.mesh.positions[:, 1].max() - viewer.rigs.shape.rest_joints(figure)[15, 1]
     # Shape and slant of the neck move the end site by a few centimetres.
     assert head[1] == pytest.approx(top, abs=0.06)
 

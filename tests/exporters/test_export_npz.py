@@ -15,13 +15,13 @@ from seamed import POSITIONS, TRIANGLES, UV_TRIANGLES, UVS, seamed_actor, seamed
 import viewer
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, export
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.captures.sampled_points import SampledPoints
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_animation import single_frame
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skinning import Skinning
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.captures.sampled_points import SampledPoints
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_animation import single_frame
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skinning import Skinning
 
 EXACT = 1e-12  # metres; sums of a few dozen values below 2
 

@@ -18,14 +18,14 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, export
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
 
 GUESS = "centimetres assumed (skeleton 170 high); --unit overrides it"
 TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up to z up

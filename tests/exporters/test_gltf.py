@@ -29,14 +29,14 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.exporters import export, files_written
 from viewer.loading import bundled_body
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.morph_target import MorphTarget, with_morphs
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning, deform
 
 
 def test_roof_round_trips(tmp_path):

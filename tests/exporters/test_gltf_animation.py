@@ -19,15 +19,15 @@ import viewer
 from viewer.errors import OutputError, RigError
 from viewer.exporters import EXPORTERS, ExportOptions
 from viewer.loading import bundled_body
-from viewer.rig.figure import Figure
-from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.motion.evaluation import pose_of, world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.morph_target import MorphTarget, with_morphs
+from viewer.rigs.motion.evaluation import pose_of, world_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skinning import Skinning, deform
 
 LIMIT = "not stored in glTF"
 ROOM = 3e-5  # in metres, for keys in single precision accumulated along the longest chain of a body

@@ -15,12 +15,12 @@ from seamed import (
 )
 
 import viewer
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning, deform
 
 
 def test_influences_can_be_limited(tmp_path):

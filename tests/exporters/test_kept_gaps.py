@@ -18,10 +18,10 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions
 from viewer.exporters._gaps import filled
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 ATOL = 1e-8  # for lengths of 1 to 10 with nine digits
 FILLED = {

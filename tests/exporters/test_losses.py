@@ -13,29 +13,29 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
-from rig import hand_made
+from rigs import hand_made
 from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_animation
 
 import viewer
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions, export
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_of
-from viewer.rig.motion.sampled_animation import (
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.evaluation import pose_of
+from viewer.rigs.motion.sampled_animation import (
     SampledAnimation,
     sample_animation,
     upright_animation,
 )
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning, deform
-from viewer.rig.units import METRES
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning, deform
+from viewer.rigs.units import METRES
 
 TOLD = 5e-3  # messages have three digits
 
@@ -136,8 +136,8 @@ def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
     found = said(write(animation, tmp_path, "bvh", "a.bvh", unit="m", digits=12))
     file, names = PlainBvh(tmp_path / "a.bvh"), figure.skeleton.names
     weights = animation.frames.shape_weights
-    shaped = viewer.rig.shape.shaped(figure, weights[0])
-    rest = viewer.rig.shape.rest_joints(shaped)
+    shaped = viewer.rigs.shape.shaped(figure, weights[0])
+    rest = viewer.rigs.shape.rest_joints(shaped)
     dense = np.zeros((figure.mesh.n_vertices, len(names)))
     owners = np.repeat(np.arange(len(dense)), np.diff(figure.skin.starts))
     np.add.at(dense, (owners, figure.skin.joints), figure.skin.weights)

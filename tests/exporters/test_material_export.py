@@ -13,8 +13,8 @@ from seamed import PICTURE, UVS, seamed_actor, seamed_mesh
 
 from viewer.exporters import export
 from viewer.formats import Source, obj
-from viewer.rig.material import Material, Texture
-from viewer.rig.scene import Actor
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.scene import Actor
 
 ORM = np.arange(3 * 4 * 4, dtype=np.uint8).reshape(3, 4, 4)[::-1]
 

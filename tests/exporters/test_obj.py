@@ -23,12 +23,12 @@ from seamed import (
 import viewer
 from viewer.errors import RigError
 from viewer.exporters import export
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skinning import Skinning
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skinning import Skinning
 
 
 def write(tmp_path, actor, name="out.obj", **skinning):

@@ -10,18 +10,18 @@ from formats.pig_text import write as write_pig
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 from plain_smpl import smpl_forward
-from rig.hand_made import skeleton
+from rigs.hand_made import skeleton
 from seamed import OTHER_PICTURE, PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
 
 import viewer
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.exporters import export
-from viewer.rig.figure import Figure
-from viewer.rig.material import Texture
-from viewer.rig.posing.pose_record import PoseRecord, apply_record
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Texture
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skinning import Skinning, deform, joint_matrices
 
 EXACT = 1e-12  # metres; sums of a few dozen values below 2
 

@@ -27,16 +27,16 @@ from viewer.exporters import EXPORTERS, ExportOptions, Part, Selection, export, 
 from viewer.exporters._rigged_files import files_of, without_correctives, write_rigged
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_record import apply_record
-from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skinning import deform
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_record import apply_record
+from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.skinning import deform
 
 # VRM files need a humanoid and are saved like glTF files.
 WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions
 from viewer.formats import Source, read
-from viewer.rig.bodies.smpl_family import ShapeSpace
+from viewer.rigs.bodies.smpl_family import ShapeSpace
 
 ATOL = 1e-12  # metres and radians
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}

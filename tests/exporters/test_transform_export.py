@@ -7,14 +7,14 @@ from exporting import export_frames
 from gltf_files import assert_drawn
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
-from rig.animated import NAMES, about, bow, channel, clip_of, leg, wave
+from rigs.animated import NAMES, about, bow, channel, clip_of, leg, wave
 
 from viewer.exporters import ExportOptions
-from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import pose_of, world_frames
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.evaluation import pose_of, world_frames
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton
 
 GROWS = channel(1, "scale", [0.0, 1.0], [[1.0, 1, 1], [2, 0.5, 1]])
 

@@ -4,7 +4,7 @@ from faults import Fault, warnings_of
 
 from viewer.diagnostics import Phrase
 from viewer.formats import Source, bvh
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 
 GOOD = """HIERARCHY
 ROOT Hips

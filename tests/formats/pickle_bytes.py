@@ -15,7 +15,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 PATH = Path("model.pkl")
 

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, detect, read
-from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.posing.pose_record import PoseRecord
+from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.posing.pose_record import PoseRecord
 
 SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names
 NO_RATE = ("F007.no-rate", None, {"rate": 30.0})

@@ -8,8 +8,8 @@ from formats.synthetic_smpl import model
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.loading import load
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
 
 ONE = "channel { extrapolate cycle bounce keys 2 { 0 1 flat smooth 2 3 linear -0.5 } }"
 GOOD = f"animation {{ range -1 4 numchannels 1 {ONE} }}"

@@ -11,12 +11,12 @@ import pytest
 from viewer.diagnostics import Collector
 from viewer.errors import ViewerError
 from viewer.formats import Source, read
-from viewer.rig.comparison.pairs import pair_names
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_record import record_of
-from viewer.rig.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
+from viewer.rigs.comparison.pairs import pair_names
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_record import record_of
+from viewer.rigs.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
 
 FEW, MANY = 200, 800
 LINEAR = 4.4  # ratio of the work for four times the joints; below 4 if part of it is constant

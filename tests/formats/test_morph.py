@@ -5,7 +5,7 @@ from faults import refusal_of, warnings_of
 
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
-from viewer.rig.morph_target import MorphTarget
+from viewer.rigs.morph_target import MorphTarget
 
 POSITIONS = "positions 2 {\n  3 0 1 2\n  7 .5 -1 1e1\n}\n"
 NORMALS = "normals 2 {\n  3 0 0 1\n  7 0 1 0\n}\n"

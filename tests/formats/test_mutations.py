@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from viewer.errors import ViewerError
 from viewer.formats import Source, read
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skinning import deform
 
 pytestmark = pytest.mark.slow
 

@@ -13,11 +13,11 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import Source, skel, skin, write
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import skin_from_lists
 
 INF = math.inf
 LARGEST = float(np.finfo(np.float32).max)

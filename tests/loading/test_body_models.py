@@ -21,12 +21,12 @@ from viewer.loading import Contents, MotionSettings, load
 from viewer.loading.assembly import begin
 from viewer.media.output_checks import check_targets
 from viewer.models import save_model_folder
-from viewer.rig.bodies.smpl_family import ShapeSpace
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.skinning import deform
+from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.joint_map import JointMap
+from viewer.rigs.skinning import deform
 
 SCALES = {"NEUTRAL": 1.0, "FEMALE": 0.9, "MALE": 1.1}
 LEFT_KNEE, LEFT_HIP = 4, 1

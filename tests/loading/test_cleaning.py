@@ -10,11 +10,11 @@ from exporting import export_frames
 from faults import told
 from formats.capture_files import body, points, write_frames
 from formats.easymocap.test_camera_files import cameras
-from lint.sound import keypoints, legs, standing
+from linting.sound import keypoints, legs, standing
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.animated import leg
-from rig.retargeting.rest_twins import t_pose, written
-from rig.retargeting.walking import RATE, walk
+from rigs.animated import leg
+from rigs.retargeting.rest_twins import t_pose, written
+from rigs.retargeting.walking import RATE, walk
 
 from viewer.cli import run
 from viewer.errors import RigError
@@ -26,15 +26,15 @@ from viewer.loading.cleaning import clean_up
 from viewer.loading.placing import placed_views, stand_up
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import CleanUp
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.cleanup.smoothing import SavitzkyGolay
-from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.scene import Actor, Scene, scene_unit
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.cleanup.smoothing import SavitzkyGolay
+from viewer.rigs.geometry.transform import rotation_transform
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.scene import Actor, Scene, scene_unit
 
 FIGURE = legs()
 

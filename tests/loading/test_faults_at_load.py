@@ -12,7 +12,7 @@ from formats.video_mocap.tool_files import wham_file
 
 import viewer
 from viewer.cli import run
-from viewer.lint import SEVERITIES, lint_files
+from viewer.linting import SEVERITIES, lint_files
 from viewer.loading import MotionSettings, bundled_body, load
 
 GOOD, SMPL = skin_text.GOOD, synthetic_smpl.model("smpl")

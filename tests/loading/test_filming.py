@@ -13,8 +13,8 @@ from viewer.errors import FormatError, RigError
 from viewer.loading import MotionSettings, load
 from viewer.loading.driving import filmed
 from viewer.media.video import VideoSink
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.capture import Capture
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.capture import Capture
 
 SIZE = (64, 48)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, NAMES, forward, write
 from numpy.testing import assert_allclose
-from rig.animated import animated_leg, animation, bow, leg
+from rigs.animated import animated_leg, animation, bow, leg
 
 import viewer
 from viewer.commands._info_clips import animation_lines, describe_animations
@@ -17,16 +17,16 @@ from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading import Contents, MotionSettings, begin, bundled_body
 from viewer.loading.capturing import Builder
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure, FigureGroup, read_from
-from viewer.rig.geometry.rotation import quaternion_to_matrix, rotation_vector_to_matrix
-from viewer.rig.motion.body_motion import ParameterMotion
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import Animation
-from viewer.rig.pose import joint_rotations
-from viewer.rig.skinning import deform
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure, FigureGroup, read_from
+from viewer.rigs.geometry.rotation import quaternion_to_matrix, rotation_vector_to_matrix
+from viewer.rigs.motion.body_motion import ParameterMotion
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import Animation
+from viewer.rigs.pose import joint_rotations
+from viewer.rigs.skinning import deform
 
 
 def opened(*figures, animation="", files=None):

@@ -18,8 +18,8 @@ from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.media.video_kinds import VIDEOS
 from viewer.rendering.gpu.program import SHADING
-from viewer.rig.scalars import SCALARS
-from viewer.rig.skinning import METHODS
+from viewer.rigs.scalars import SCALARS
+from viewer.rigs.skinning import METHODS
 
 FOLDER = Path(viewer.__file__).parent / "manual"
 

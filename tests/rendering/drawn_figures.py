@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin, skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin, skin_from_lists
 
 ROTATIONS = (3, 4, 5)
 

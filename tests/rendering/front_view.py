@@ -10,11 +10,11 @@ from rendering.drawn_figures import skeleton, square
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skin import skin_from_lists
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 PIXELS = 80  # pixels per side; x and y are from -2 to 2, so a unit is 20 pixels

@@ -11,15 +11,15 @@ from rendering.golden_scenes import LINES, Shot, options, posed_fox
 import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.keypoint_layouts import keypoint_layout
-from viewer.rig.captures.points import PointClip
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import joint_matrices
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.keypoint_layouts import keypoint_layout
+from viewer.rigs.captures.points import PointClip
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import joint_matrices
 
 # Positions of the body25 keypoints of a walking person in metres, in the order of the layout.
 _WALK = [

@@ -12,10 +12,10 @@ from rendering.golden_scenes import BEND, Shot, options, posed_fox
 
 import viewer
 from viewer.resources import resource
-from viewer.rig.annotations import BodyParts, VertexField
-from viewer.rig.figure import Figure
-from viewer.rig.scalars import SCALARS
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.annotations import BodyParts, VertexField
+from viewer.rigs.figure import Figure
+from viewer.rigs.scalars import SCALARS
+from viewer.rigs.scene import Actor, Scene
 
 
 @cache

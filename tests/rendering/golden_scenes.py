@@ -20,11 +20,11 @@ from rendering.picture_metrics import OTHER_SSIM_ERROR
 import viewer
 from viewer.rendering.camera import VIEWS, Camera, fit
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor, Scene, scene_points
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor, Scene, scene_points
 
 SIZE = 300, 300
 LINES = 0.06  # rasterisers cover different pixels with thin lines

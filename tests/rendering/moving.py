@@ -5,11 +5,11 @@ import math
 import numpy as np
 from rendering.drawn_figures import arm
 
-from viewer.rig.captures.cameras import CameraMotion, CameraView
-from viewer.rig.geometry.rotation import axis_rotations
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.captures.cameras import CameraMotion, CameraView
+from viewer.rigs.geometry.rotation import axis_rotations
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 RATE, SPEED, MISSING = 10.0, 2.0, 5
 FILMED, SIZE = 5, (160, 120)

@@ -4,7 +4,7 @@ import numpy as np
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.scene import scene_box
+from viewer.rigs.scene import scene_box
 
 WHITE = (255, 255, 255)
 N = 100  # pixels per side

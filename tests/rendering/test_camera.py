@@ -30,8 +30,8 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.projection import picture_scale, project, project_segments, unproject
 from viewer.rendering.recorder import Recording, _Cameras
 from viewer.rendering.view import view_of
-from viewer.rig.captures.cameras import view_at
-from viewer.rig.scene import Scene
+from viewer.rigs.captures.cameras import view_at
+from viewer.rigs.scene import Scene
 
 BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 ANGLES = [(0, 0), (35, 15), (-120, -60), (180, 0), (90, 90), (-30, -90), (10, 89.999)]

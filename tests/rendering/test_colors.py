@@ -21,7 +21,7 @@ from viewer.rendering.colors import (
     part_palette,
 )
 from viewer.rendering.options import COLORMAPS
-from viewer.rig.srgb import decode_srgb, encode_srgb
+from viewer.rigs.srgb import decode_srgb, encode_srgb
 
 # Matrices from sRGB to CIE XYZ (IEC 61966-2-1), and from XYZ to the lightness of OKLab (Ottosson
 # 2020).

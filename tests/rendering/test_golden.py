@@ -19,9 +19,9 @@ import viewer
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.offscreen import Offscreen
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Scene, scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Scene, scene_box
 
 SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
 KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for differing images

@@ -22,10 +22,10 @@ from rendering.front_view import (
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.resources import resource
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 FLAT = (128, 128, 255)
 

@@ -19,7 +19,7 @@ from viewer.rendering.gpu.target import Target, target_bytes
 from viewer.rendering.gpu.upload import matrix_texture, picture_texture
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import Scene, scene_box
+from viewer.rigs.scene import Scene, scene_box
 
 ROOT = Path(__file__).resolve().parents[2]
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
@@ -189,7 +189,7 @@ def run_alone(code: str) -> str:
 MEMORY = """
 import threading, viewer
 from rendering.drawn_figures import arm
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene
 from viewer.rendering.options import DisplayOptions
 
 def resident():

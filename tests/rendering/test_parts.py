@@ -13,8 +13,8 @@ from viewer.rendering.colors import part_colors
 from viewer.rendering.gpu.index_sets import kept_triangles
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
-from viewer.rig.annotations import BodyParts, ReducedMesh
-from viewer.rig.scene import scene_box
+from viewer.rigs.annotations import BodyParts, ReducedMesh
+from viewer.rigs.scene import scene_box
 
 NAMES = ("left", "right", "belt")
 # The first colours of Okabe and Ito, as published.

@@ -11,10 +11,10 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rig.annotations import Keypoints, ReducedMesh
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.annotations import Keypoints, ReducedMesh
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 
 def parallel() -> Camera:

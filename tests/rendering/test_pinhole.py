@@ -11,10 +11,10 @@ from viewer.rendering.camera import Camera, camera_axes, camera_from_view, eye, 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.pinhole import distortion_error, picture_size
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene
 
 BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 K = np.array([[800.0, 0.0, 300.0], [0.0, 820.0, 260.0], [0.0, 0.0, 1.0]])

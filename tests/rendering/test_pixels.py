@@ -10,9 +10,9 @@ from rendering.plain_pictures import WHITE, covered, draw, front, lights, near, 
 from viewer.errors import ViewerError
 from viewer.rendering.options import Lights
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scene import Actor, Scene
 
 RED, GREEN, BLUE, YELLOW = (220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 210, 50)
 

@@ -15,16 +15,16 @@ from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.scalar_look import look_of, typical_span
 from viewer.rendering.scalar_quantities import ScalarBuffer, name_for
-from viewer.rig import scalars
-from viewer.rig.annotations import BodyParts
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
-from viewer.rig.scalars import SCALARS, compute
-from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning
+from viewer.rigs import scalars
+from viewer.rigs.annotations import BodyParts
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scalars import SCALARS, compute
+from viewer.rigs.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning
 
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 

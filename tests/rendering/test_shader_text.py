@@ -3,7 +3,7 @@
 import pytest
 
 from viewer.rendering.shader_text import embedded_text
-from viewer.rig.skinning import METHODS
+from viewer.rigs.skinning import METHODS
 
 
 @pytest.mark.parametrize("method", METHODS)

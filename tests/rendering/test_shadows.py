@@ -21,12 +21,12 @@ from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.sampling import limit_passes, time_note
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import deform
 
 WHITE = picture([[(255, 255, 255)]])
 GROUND = np.array([[-1.0, 0.0, -1.0], [1.0, 1.5, 1.0]])  # at height 0

@@ -22,7 +22,7 @@ from viewer.app.weights.weights_panel import Weights, no_view, pin_vertex, show_
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rendering.renderer import Renderer
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.skeleton import joint_label
 
 _POPUP = "context menu"
 _LONGEST = 40  # maximum length of a name in characters

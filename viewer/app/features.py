@@ -64,9 +64,9 @@ from viewer.app.weights.weights_panel import toggle_picking, toggle_vertex_info,
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN, Shading
-from viewer.rig.motion.animation_choice import animation_labels
-from viewer.rig.skeleton import joint_labels, shown_joints
-from viewer.rig.skinning import METHODS
+from viewer.rigs.motion.animation_choice import animation_labels
+from viewer.rigs.skeleton import joint_labels, shown_joints
+from viewer.rigs.skinning import METHODS
 
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key

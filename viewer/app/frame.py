@@ -46,7 +46,7 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _LAID_OUT = 2  # first frame in which the panels leave room for the view, counted from 1
 

@@ -16,7 +16,7 @@ from viewer.app.preferences.preferences import Appearance
 from viewer.phrases import in_window
 from viewer.rendering.gpu.context import Graphics
 from viewer.rendering.gpu.target import Target
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to settle
 

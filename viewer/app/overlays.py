@@ -23,7 +23,7 @@ from viewer.app.weights.legend import draw_legend
 from viewer.app.weights.vertex_panel import draw_hover_text
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
-from viewer.rig.scene import scene_unit
+from viewer.rigs.scene import scene_unit
 
 _SHOW_PROGRESS_AFTER = 0.3  # seconds before the progress bar appears
 _BAR_WIDTH = 52.0 / 3.0  # width of the progress bar, in font sizes

@@ -47,9 +47,9 @@ from viewer.phrases import in_window, printable  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.gpu.program import Programs  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
-from viewer.rig.inspection.front import guess_front  # noqa: E402
-from viewer.rig.mesh import bounding_box  # noqa: E402
-from viewer.rig.scene import Scene, scene_points  # noqa: E402
+from viewer.rigs.inspection.front import guess_front  # noqa: E402
+from viewer.rigs.mesh import bounding_box  # noqa: E402
+from viewer.rigs.scene import Scene, scene_points  # noqa: E402
 
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two frames
 _FIRST_FRAMES = 3  # frames after which fonts for additional scripts are loaded

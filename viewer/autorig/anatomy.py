@@ -26,7 +26,7 @@ import numpy as np
 from viewer.autorig.solid import RESOLUTION, Solid, solid_of
 from viewer.data_classes import dataclass
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

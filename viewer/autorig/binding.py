@@ -32,17 +32,17 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import axis_rotations as about_axis
-from viewer.rig.geometry.transform import affine_matrices, apply_transform
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.shape import shaped_skeleton
-from viewer.rig.skeleton import Skeleton, joint_label, shown_joints
-from viewer.rig.skin import Skin, idle_joints, skin_rows
-from viewer.rig.units import METRES, unit_of_scaled
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import axis_rotations as about_axis
+from viewer.rigs.geometry.transform import affine_matrices, apply_transform
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.shape import shaped_skeleton
+from viewer.rigs.skeleton import Skeleton, joint_label, shown_joints
+from viewer.rigs.skin import Skin, idle_joints, skin_rows
+from viewer.rigs.units import METRES, unit_of_scaled
 
 _Weigh = Callable[[Welded, Solid, Bones], BoneWeights]
 _METHODS: dict[str, tuple[_Weigh, str]] = {

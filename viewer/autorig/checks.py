@@ -10,13 +10,13 @@ import numpy as np
 from viewer.autorig.transfer.joint_transfer import outside
 from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.pose import Pose
-from viewer.rig.skeleton import joint_label
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.pose import Pose
+from viewer.rigs.skeleton import joint_label
+from viewer.rigs.skinning import deform, joint_matrices
 
 _EXACT = 1e-4  # ratio of residual to size above which a warning is given
 

@@ -20,11 +20,11 @@ import numpy as np
 from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
-from viewer.rig.geometry.topology import CLOSED, Indices, edges_of, part_volumes
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import Mesh, area_vectors, vertex_normals
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rigs.geometry.topology import CLOSED, Indices, edges_of, part_volumes
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.mesh import Mesh, area_vectors, vertex_normals
 
 _INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed

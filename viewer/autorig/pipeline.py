@@ -34,15 +34,15 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
-from viewer.rig.pose import Pose
-from viewer.rig.shape import pose_weights, shaped
-from viewer.rig.skeleton import Skeleton, joint_label
-from viewer.rig.skinning import joint_matrices
-from viewer.rig.units import UNIT_NAMES, unit_of_scaled
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.mesh import Mesh, bounding_box, box_size, vertex_normals
+from viewer.rigs.pose import Pose
+from viewer.rigs.shape import pose_weights, shaped
+from viewer.rigs.skeleton import Skeleton, joint_label
+from viewer.rigs.skinning import joint_matrices
+from viewer.rigs.units import UNIT_NAMES, unit_of_scaled
 
 _JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
 

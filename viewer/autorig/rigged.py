@@ -11,13 +11,13 @@ from viewer.autorig.weights.result import WeightTransfer
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.pose import Pose
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.pose import Pose
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 _CONFIDENCE = ("matched", "inpainted", "rigid")
 """Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours,

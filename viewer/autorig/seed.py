@@ -15,14 +15,14 @@ from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import rounded
 from viewer.progress import report_fraction
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import Mesh, bounding_box, vertex_normals
-from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.skin import Skin
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.mesh import Mesh, bounding_box, vertex_normals
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.skin import Skin
+from viewer.rigs.skinning import deform
 
 _FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
 

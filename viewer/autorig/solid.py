@@ -18,8 +18,8 @@ from viewer.autorig.surface.welding import one_sided, weld
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import report_fraction
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.topology import part_volumes
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.topology import part_volumes
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

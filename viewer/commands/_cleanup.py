@@ -12,7 +12,7 @@ from viewer.loading.settings import CleanUp
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
-    from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
+    from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 _LONGEST_WINDOW = 9999
 _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "order")}
@@ -73,7 +73,7 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
 
 
 def _one_euro(values: dict[str, float]) -> OneEuro:
-    from viewer.rig.cleanup.smoothing import OneEuro
+    from viewer.rigs.cleanup.smoothing import OneEuro
 
     found = OneEuro(**values)
     if min(found.cutoff, found.speed_cutoff) <= 0.0:
@@ -82,7 +82,7 @@ def _one_euro(values: dict[str, float]) -> OneEuro:
 
 
 def _savgol(values: dict[str, float]) -> SavitzkyGolay:
-    from viewer.rig.cleanup.smoothing import SavitzkyGolay
+    from viewer.rigs.cleanup.smoothing import SavitzkyGolay
 
     window, order = values.get("window", 0.0), values.get("order", 2.0)
     is_odd = window % 2 == 1 and 3 <= window <= _LONGEST_WINDOW

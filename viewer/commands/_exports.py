@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from viewer.commands._scene import SceneOptions
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import Skinning
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.exporters import ExportOptions, VrmMeta
@@ -75,7 +75,7 @@ def export(
     from viewer.commands._pictures import scene_of, without_dashes
     from viewer.commands.convert import check_outputs, selected
     from viewer.exporters import ExportOptions, export, output_files
-    from viewer.rig.motion.evaluation import pose_actors
+    from viewer.rigs.motion.evaluation import pose_actors
 
     chosen = replace(options) if options is not None else ExportOptions()
     chosen.skinning = chosen.skinning if skinning is None else skinning

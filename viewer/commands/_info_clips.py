@@ -10,12 +10,12 @@ import numpy as np
 from viewer.diagnostics.record import JsonObject
 from viewer.errors import FormatError
 from viewer.phrases import counted, printable, rounded
-from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import TransformClip, is_regular
-from viewer.rig.scene import Actor, Motion
+from viewer.rigs.captures.points import PointClip
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformClip, is_regular
+from viewer.rigs.scene import Actor, Motion
 
 _SHOWN_GAPS = 6
 _MILLISECOND = 0.001

@@ -21,9 +21,9 @@ from viewer.rendering.camera_views import with_cameras
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.offscreen import render as draw
 from viewer.rendering.options import SIZE, DisplayOptions, Quality
-from viewer.rig.arrays import Bytes
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Actor, Scene, scene_points
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Actor, Scene, scene_points
 
 _OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
 

@@ -18,16 +18,16 @@ from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read
 from viewer.near_names import name_hint
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
-from viewer.rig.skinning import Skinning, file_method
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
+from viewer.rigs.skinning import Skinning, file_method
 
 if TYPE_CHECKING:
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.posing.pose_record import PoseRecord
 
 _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 _LISTED = 12  # maximum number of names listed in a message
@@ -92,8 +92,8 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
     """Shape and pose a scene; return messages about what could not be applied exactly."""
     notes = apply_time(scene, frames)
     if pose.hands:
-        from viewer.rig.hands import hand_vectors
-        from viewer.rig.posing.pose_vector import set_joint_rotations
+        from viewer.rigs.hands import hand_vectors
+        from viewer.rigs.posing.pose_vector import set_joint_rotations
 
         handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
         if not handed:
@@ -114,12 +114,12 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
         notes += _apply_shape(scene, pose.shape)
     expression = _numbers("--expression", pose.expression)
     if expression is not None:
-        from viewer.rig.posing.pose_record import PoseRecord
+        from viewer.rigs.posing.pose_record import PoseRecord
 
         notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
     notes += apply_dofs(scene, pose.dof)
     if pose.mirror:
-        from viewer.rig.retargeting.mirror import mirror_pose
+        from viewer.rigs.retargeting.mirror import mirror_pose
 
         for actor in scene.actors:
             if actor.pose is not None:
@@ -133,7 +133,7 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
 def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     """Return the pose given as numbers or read from a file, and the file."""
     from viewer.formats.pose import read as read_pose
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.posing.pose_record import PoseRecord
 
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
@@ -169,7 +169,7 @@ def _apply_record(
 ) -> list[Diagnostic]:
     """Apply a record, possibly from a file, to the first actor that accepts it."""
     from viewer.formats.pose import pose_error
-    from viewer.rig.posing.pose_record import apply_record
+    from viewer.rigs.posing.pose_record import apply_record
 
     problem: RigError | None = None
     for actor in scene.actors:
@@ -187,7 +187,7 @@ def _apply_record(
 
 def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
     """Set shape weights by name or in order; figures without shapes may have morphs."""
-    from viewer.rig.posing.pose_record import PoseRecord, apply_record
+    from viewer.rigs.posing.pose_record import PoseRecord, apply_record
 
     if "=" in text:  # weights given by name, such as ``open=0.5,wide=1``
         actor, record = _named_record(scene, text)
@@ -241,7 +241,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
 
 def _place(scene: Scene, label: str, asked: str, text: str) -> bool:
     """Move or scale the first posed figure as a whole; return whether the label refers to it."""
-    from viewer.rig.posing.pose_record import PoseRecord, apply_record
+    from viewer.rigs.posing.pose_record import PoseRecord, apply_record
 
     part = label[len(_FIGURE) :].lower()
     actor = next((actor for actor in scene.actors if actor.pose is not None), None)
@@ -296,7 +296,7 @@ def _dof_value(asked: str, text: str, is_rotation: bool) -> float:
 
 def _has_only_morphs(figure: Figure) -> bool:
     """Return whether a figure has blend shapes and all of them are morphs."""
-    from viewer.rig.morph_target import MORPH_GROUP
+    from viewer.rigs.morph_target import MORPH_GROUP
 
     groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
     return bool(groups) and all(group == MORPH_GROUP for group in groups)
@@ -304,7 +304,7 @@ def _has_only_morphs(figure: Figure) -> bool:
 
 def _morph_record(figure: Figure, values: Floats) -> PoseRecord:
     """Return a record that sets the first N morphs to ``values``, (N,), and the others to 0."""
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.posing.pose_record import PoseRecord
 
     names = () if figure.blend_shapes is None else figure.blend_shapes.names
     if len(values) > len(names) and values[len(names) :].any():
@@ -333,7 +333,7 @@ def _named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 
 
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.posing.pose_record import PoseRecord
 
     pose = actor.require_pose()
     assert actor.figure.blend_shapes is not None  # checked by the caller

@@ -12,10 +12,10 @@ from viewer.commands._settings import add_settings
 from viewer.errors import RigError, ViewerError
 from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.number_text import number_text
-from viewer.rig.scalars import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scalars import (
     SCALARS,
     categories,
     compute,
@@ -29,8 +29,8 @@ from viewer.rig.scalars import (
     shown_unit,
     split_name,
 )
-from viewer.rig.scene import Scene
-from viewer.rig.skeleton import joint_labels
+from viewer.rigs.scene import Scene
+from viewer.rigs.skeleton import joint_labels
 
 _WHOLE = ("discrete", "categorical")
 

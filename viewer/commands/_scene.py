@@ -29,13 +29,13 @@ from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
 from viewer.phrases import all_of, printable
 from viewer.progress import report
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.diagnostics.codes import Severity
     from viewer.loading.capturing import Builder
-    from viewer.rig.retargeting.joint_map import JointMap
+    from viewer.rigs.retargeting.joint_map import JointMap
 
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # maximum number of names in a message

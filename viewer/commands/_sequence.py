@@ -16,8 +16,8 @@ from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
-from viewer.rig.arrays import Floats
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.options import DisplayOptions

@@ -17,14 +17,14 @@ from viewer.phrases import listed, printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BACKGROUNDS, DisplayOptions, parse_color
-from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import FRONTS, Front, WantedFront, front_axes, guess_front
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Scene
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.inspection.front import FRONTS, Front, WantedFront, front_axes, guess_front
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Scene
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.cameras import CameraView
+    from viewer.rigs.captures.cameras import CameraView
 
 _DRAWN = (
     *("bones", "background", "samples", "quality", "shadows", "flat", "wireframe", "normals"),
@@ -121,7 +121,7 @@ def camera_of(options: ViewOptions, scene: Scene, points: Floats, size: tuple[in
         if options.look_at is not None:
             raise ViewerError("--view and --look-at: expected one of them, found both")
         view = _find_view(scene, options.view)
-        from viewer.rig.captures.carried_view import view_in
+        from viewer.rigs.captures.carried_view import view_in
 
         camera = camera_from_view(view, size, scene.up, seen=view_in(view, scene))
         camera.front = front_azimuth(_front_of(options, scene), scene.up)

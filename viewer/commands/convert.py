@@ -61,13 +61,13 @@ from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
 from viewer.near_names import name_hint
 from viewer.phrases import Remedy, agree, all_of, counted, printable
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
-from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range, upright_single_frame
-from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
-from viewer.rig.motion.timing import frame_at
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import Skinning
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.motion.animation_choice import has_own_animations, keeps_keys, own_animations
+from viewer.rigs.motion.sampled_animation import SampledAnimation, frame_range, upright_single_frame
+from viewer.rigs.motion.spring_motion import has_springs, with_baked_springs
+from viewer.rigs.motion.timing import frame_at
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _saving_joint_map(
         return
     from viewer.formats._joint_map import joint_map_text
     from viewer.media.saving import save_text
-    from viewer.rig.retargeting.driven_clip import full_map
+    from viewer.rigs.retargeting.driven_clip import full_map
 
     texts: dict[str, Actor] = {}
     for actor in scene.actors:

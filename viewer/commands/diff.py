@@ -32,14 +32,14 @@ from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
 from viewer.phrases import brief, printable, rounded
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.annotations import VertexField
-from viewer.rig.comparison import Difference, Measure, MeasureKind, compare
-from viewer.rig.comparison.steps import FrameRange
-from viewer.rig.motion.clip import Clip, suits
-from viewer.rig.scalars import length_unit
-from viewer.rig.scene import Actor, Motion, Scene, figure_pose
-from viewer.rig.skinning import Skinning
-from viewer.rig.units import METRES
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.comparison import Difference, Measure, MeasureKind, compare
+from viewer.rigs.comparison.steps import FrameRange
+from viewer.rigs.motion.clip import Clip, suits
+from viewer.rigs.scalars import length_unit
+from viewer.rigs.scene import Actor, Motion, Scene, figure_pose
+from viewer.rigs.skinning import Skinning
+from viewer.rigs.units import METRES
 from viewer.streams import require_stdout, summary_stream
 
 _DIFFERS = 1  # exit code if there are differences

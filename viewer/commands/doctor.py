@@ -27,7 +27,7 @@ from viewer.phrases import counted, printable
 if TYPE_CHECKING:
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.options import DisplayOptions
-    from viewer.rig.scene import Scene
+    from viewer.rigs.scene import Scene
 
 _PACKAGES = (
     "numpy",
@@ -358,7 +358,7 @@ def _correctives(offscreen: Offscreen, crowd: Scene) -> Iterator[Measured]:
     import numpy as np
 
     from viewer.rendering.gpu.rest_buffers import RestBuffers
-    from viewer.rig.shape import pose_weights
+    from viewer.rigs.shape import pose_weights
 
     figure = crowd.actors[0].figure
     assert figure.correctives is not None  # of the bundled body
@@ -380,7 +380,7 @@ def _drawn(
 ) -> Callable[[], object]:
     """Return a function that draws a scene into memory, in a new pose each time if it moves."""
     from viewer.rendering.offscreen import default_camera
-    from viewer.rig.scene import scene_box
+    from viewer.rigs.scene import scene_box
 
     camera, box = default_camera(scene, _SIZE), scene_box(scene)
 
@@ -394,7 +394,7 @@ def _drawn(
 
 def _crowd(scene: Scene) -> Scene:
     """Return copies of the first figure, in rows of ten."""
-    from viewer.rig.scene import Actor, Scene
+    from viewer.rigs.scene import Actor, Scene
 
     actors = [Actor(scene.actors[0].figure) for _ in range(_INSTANCES)]
     for number, actor in enumerate(actors):
@@ -418,7 +418,7 @@ def _parts() -> Iterator[Measured]:
 
     from viewer.loading import bundled_body, load
     from viewer.media.png import encode_png
-    from viewer.rig.kinematics import world_matrices
+    from viewer.rigs.kinematics import world_matrices
 
     scene = load(bundled_body())
     actor = scene.actors[0]

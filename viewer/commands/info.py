@@ -20,26 +20,26 @@ from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.diagnostics.record import JsonObject, note_values
 from viewer.phrases import counted, listed, printable, rounded
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import Mesh, bounding_box, box_size, flat_triangles
-from viewer.rig.number_text import number_text
-from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.scene import Actor, Scene, actor_points, scene_unit
-from viewer.rig.shape import shaped
-from viewer.rig.skeleton import (
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import Mesh, bounding_box, box_size, flat_triangles
+from viewer.rigs.number_text import number_text
+from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.scene import Actor, Scene, actor_points, scene_unit
+from viewer.rigs.shape import shaped
+from viewer.rigs.skeleton import (
     DOF_KINDS,
     Skeleton,
     joint_labels,
     shown_joints,
     shown_parents,
 )
-from viewer.rig.skinning import METHODS, PURE, Skinning
+from viewer.rigs.skinning import METHODS, PURE, Skinning
 
 if TYPE_CHECKING:
-    from viewer.rig.blendshapes import BlendShapes
-    from viewer.rig.material import Material
-    from viewer.rig.skin import Skin
+    from viewer.rigs.blendshapes import BlendShapes
+    from viewer.rigs.material import Material
+    from viewer.rigs.skin import Skin
 
 # If more unlimited DOFs than this differ from 0, only their number is printed.
 _MOST_FREE_DOFS = 24
@@ -109,7 +109,7 @@ def _describe_actor(actor: Actor, up: Up) -> JsonObject:
     if figure.skin is not None:
         parts["skin"] = _describe_skin(figure.skin, figure.skeleton)
     if figure.blend_shapes is not None:
-        from viewer.rig.morph_target import MORPH_GROUP
+        from viewer.rigs.morph_target import MORPH_GROUP
 
         if MORPH_GROUP in figure.blend_shapes.groups:
             parts["morphs"] = _describe_morphs(figure.blend_shapes)
@@ -190,7 +190,7 @@ def _describe_mesh(mesh: Mesh) -> JsonObject:
 
 
 def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> JsonObject:
-    from viewer.rig.skin import has_influence, idle_joints, influence_counts, weight_sums
+    from viewer.rigs.skin import has_influence, idle_joints, influence_counts, weight_sums
 
     counts = influence_counts(skin)
     sums = weight_sums(skin)
@@ -212,7 +212,7 @@ def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> JsonObject:
 
 def _describe_morphs(shapes: BlendShapes) -> list[JsonObject]:
     """Return the morph targets with the numbers of vertices and materials that each changes."""
-    from viewer.rig.morph_target import MORPH_GROUP
+    from viewer.rigs.morph_target import MORPH_GROUP
 
     rows = [row for row, group in enumerate(shapes.groups) if group == MORPH_GROUP]
     counts = shapes.direction_values()[rows].any(axis=2).sum(axis=1)
@@ -367,7 +367,7 @@ def _describe_model(actor: Actor, skinning: Skinning) -> JsonObject:
             "figure_scale": pose.figure_scale,
         }
         if figure.pose_layout is not None and figure.skeleton is not None:
-            from viewer.rig.posing.pose_vector import write_vector
+            from viewer.rigs.posing.pose_vector import write_vector
 
             numbers = write_vector(figure.pose_layout, figure.skeleton, pose)
             model["own_numbers"] = numbers.tolist()
@@ -377,8 +377,8 @@ def _describe_model(actor: Actor, skinning: Skinning) -> JsonObject:
 
 
 def _rest(figure: Figure, pose: Pose | None) -> JsonObject:
-    from viewer.rig.inspection.measure import measure
-    from viewer.rig.skinning import deform
+    from viewer.rigs.inspection.measure import measure
+    from viewer.rigs.skinning import deform
 
     rest = figure if pose is None else shaped(figure, pose.shape_weights)
     skeleton, mesh = figure.skeleton, figure.mesh
@@ -408,7 +408,7 @@ def _annotations(figure: Figure) -> JsonObject:
             "triangles": len(figure.reduced.triangles),
         }
     if figure.symmetry is not None:
-        from viewer.rig.retargeting.mirror import asymmetry
+        from viewer.rigs.retargeting.mirror import asymmetry
 
         parts["asymmetry"] = float(asymmetry(figure).max())
     return parts
@@ -418,7 +418,7 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
     """Return the largest difference between skinning options in this pose, for each option."""
     if not figure.is_attached or pose is None:
         return {}
-    from viewer.rig.scalars import compute, strongest
+    from viewer.rigs.scalars import compute, strongest
 
     effects: dict[str, float] = {}
     for count in sorted({*_LIMITS, skinning.max_influences} - {0}):
@@ -473,7 +473,7 @@ def _model_lines(model: JsonObject, figure: Figure) -> list[str]:
 
 
 def _length(figure: Figure, value: float) -> str:
-    from viewer.rig.scalars import length_text
+    from viewer.rigs.scalars import length_text
 
     return length_text(figure, value)
 

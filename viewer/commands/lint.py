@@ -15,7 +15,7 @@ from viewer.commands._settings import add_settings, number, settings_of
 from viewer.commands._usage import require_files
 from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
-from viewer.lint import (
+from viewer.linting import (
     CODES,
     SEVERITIES,
     LintOptions,

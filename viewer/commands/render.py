@@ -53,10 +53,10 @@ from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import SIZE, DisplayOptions
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Scene, scene_points
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import Scene, scene_points
+from viewer.rigs.skinning import Skinning
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
@@ -214,7 +214,7 @@ def _draw_onion(drawing: Drawing, scene: Scene) -> None:
     """Draw several poses of a motion in one image."""
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
-    from viewer.rig.motion.onion import onion
+    from viewer.rigs.motion.onion import onion
 
     asked, options, size = drawing.asked, drawing.options, drawing.size
     output = drawing.request.output

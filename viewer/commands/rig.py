@@ -54,15 +54,15 @@ from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable, rounded
 from viewer.progress import part_of_work
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.motion.clip import Clip, is_course_rig
-from viewer.rig.motion.sampled_animation import baked
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skinning import joint_matrices, posed_mesh
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.motion.clip import Clip, is_course_rig
+from viewer.rigs.motion.sampled_animation import baked
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 
 # Landmarks.

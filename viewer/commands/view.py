@@ -45,10 +45,10 @@ from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rendering.options import SIZE, DisplayOptions
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Scene, scene_points
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import Scene, scene_points
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image
 
 import viewer
-from viewer.rig.annotations import VertexField
+from viewer.rigs.annotations import VertexField
 
 scene = viewer.load()
 actor = scene.actors[0]

@@ -17,14 +17,14 @@ from viewer.exporters._options import ExportOptions, VrmMeta
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import all_of, counted, printable
-from viewer.rig.bodies.smpl_family import member_of
-from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.sampled_points import sample_upright_points
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_animation import upright_animation
-from viewer.rig.motion.upright import upright_actor, upright_placement
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import Skinning
+from viewer.rigs.bodies.smpl_family import member_of
+from viewer.rigs.captures.person import is_tracked, person_label
+from viewer.rigs.captures.sampled_points import sample_upright_points
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_animation import upright_animation
+from viewer.rigs.motion.upright import upright_actor, upright_placement
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import Skinning
 
 __all__ = [
     "EXPORTERS",

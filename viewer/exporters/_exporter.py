@@ -10,13 +10,13 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools
-from viewer.rig.captures.sampled_points import SampledPoints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Bools
+from viewer.rigs.captures.sampled_points import SampledPoints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.scene import Actor, Scene
 
 FOLDER = "/"
 """Placeholder, among suffixes, for a folder."""

@@ -12,18 +12,18 @@ from viewer.errors import RigError
 from viewer.exporters._left_out import joint_scales_note
 from viewer.exporters._options import ExportOptions
 from viewer.phrases import Remedy, rounded
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
-from viewer.rig.geometry.rotation import quarter_turn, rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import SIGNED_UPS, SignedUp
-from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rig.motion.evaluation import Frames, frames_of
-from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
-from viewer.rig.motion.timing import Timing
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.bodies.smpl_family import FAMILY, Member, ShapeSpace
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import SIGNED_UPS, SignedUp
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip, root_positions
+from viewer.rigs.motion.evaluation import Frames, frames_of
+from viewer.rigs.motion.sampled_animation import SampledAnimation, rotated_frames
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered
 _NEGLIGIBLE = 1e-6  # in metres; also the relative deviation of a scale from 1

@@ -12,10 +12,10 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._options import GAPS, GapHandling
 from viewer.phrases import agree, listed
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.geometry.quaternion import slerp
-from viewer.rig.motion.evaluation import Frames
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.geometry.quaternion import slerp
+from viewer.rigs.motion.evaluation import Frames
 
 Indices = NDArray[np.intp]
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.phrases import all_of, counted, listed, rounded
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.animation_choice import animation_labels
-from viewer.rig.motion.evaluation import Frames, JointMotion
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.transform_clip import is_regular
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.animation_choice import animation_labels
+from viewer.rigs.motion.evaluation import Frames, JointMotion
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.transform_clip import is_regular
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton
 
 _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
 

@@ -11,9 +11,9 @@ from viewer.errors import OutputError
 from viewer.exporters._exporter import Exporter, Part
 from viewer.exporters._options import ExportOptions
 from viewer.phrases import printable
-from viewer.rig.captures.person import person_name
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.scene import Actor
+from viewer.rigs.captures.person import person_name
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.scene import Actor
 
 PERSON = "{person}"
 """Placeholder in file names for the number of a person or actor."""

@@ -6,9 +6,9 @@ from dataclasses import field
 from typing import Literal, TypeAlias
 
 from viewer.data_classes import dataclass, setting
-from viewer.rig.geometry.vectors import SignedUp, Up
-from viewer.rig.skinning import Skinning
-from viewer.rig.units import METRES
+from viewer.rigs.geometry.vectors import SignedUp, Up
+from viewer.rigs.skinning import Skinning
+from viewer.rigs.units import METRES
 
 RotationOrder: TypeAlias = Literal["zyx", "zxy", "xyz", "xzy", "yxz", "yzx"]
 ROTATION_ORDERS: tuple[RotationOrder, ...] = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")

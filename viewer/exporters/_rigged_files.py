@@ -15,14 +15,14 @@ from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import Remedy, counted
-from viewer.rig.arrays import Arrays
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.shape import pose_weights
-from viewer.rig.skin import influence_counts, limit_influences
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rigs.arrays import Arrays
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.shape import pose_weights
+from viewer.rigs.skin import influence_counts, limit_influences
+from viewer.rigs.skinning import Skinning, deform, joint_matrices
 
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 """Suffixes that ``files_of`` accepts without further data; ``.vrm`` needs an author."""

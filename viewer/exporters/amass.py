@@ -34,11 +34,11 @@ from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
-from viewer.rig.arrays import Arrays
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rigs.arrays import Arrays
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.motion.sampled_animation import SampledAnimation
 
 Layout = Callable[[FamilyFrames, slice, float, SignedUp], Arrays]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""

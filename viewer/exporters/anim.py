@@ -18,16 +18,16 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.phrases import counted, optional
-from viewer.rig.arrays import Floats
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.clip import Clip, Tangent, evaluate_all, is_course_rig
-from viewer.rig.motion.clip_edit import clip_from_frames
-from viewer.rig.motion.evaluation import Frames, frames_between, frames_of, world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
-from viewer.rig.scalars import length_text
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.arrays import Floats
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.motion.clip import Clip, Tangent, evaluate_all, is_course_rig
+from viewer.rigs.motion.clip_edit import clip_from_frames
+from viewer.rigs.motion.evaluation import Frames, frames_between, frames_of, world_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation, frames_at
+from viewer.rigs.scalars import length_text
+from viewer.rigs.skeleton import Skeleton
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured per block

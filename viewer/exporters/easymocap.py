@@ -47,14 +47,14 @@ from viewer.interrupts import hold
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import Remedy, Shown, counted, printable
 from viewer.progress import report
-from viewer.rig.arrays import Floats
-from viewer.rig.bodies.smpl_family import Member
-from viewer.rig.captures.person import person_label
-from viewer.rig.figure import Figure
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.evaluation import frames_between
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.arrays import Floats
+from viewer.rigs.bodies.smpl_family import Member
+from viewer.rigs.captures.person import person_label
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.evaluation import frames_between
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.timing import Timing
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")

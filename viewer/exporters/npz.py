@@ -34,15 +34,15 @@ from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
 from viewer.phrases import all_of, counted, optional
-from viewer.rig.arrays import Arrays, Bools, Deferred, Floats
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.captures.sampled_points import SampledPoints
-from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rig.geometry.rotation import quarter_turn, rotation_vector_to_matrix
-from viewer.rig.motion.evaluation import pose_of, world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
-from viewer.rig.posing.pose_vector import write_vector
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.arrays import Arrays, Bools, Deferred, Floats
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.captures.sampled_points import SampledPoints
+from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
+from viewer.rigs.motion.evaluation import pose_of, world_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation, rotated_frames
+from viewer.rigs.posing.pose_vector import write_vector
+from viewer.rigs.skinning import deform, joint_matrices
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:

@@ -23,16 +23,16 @@ from viewer.formats import Source, all_or_none, free_path, save_bytes, save_part
 from viewer.formats._text.number_text import row_texts
 from viewer.media.png import encode_png
 from viewer.phrases import Shown, agree, counted, listed, printable
-from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.motion.evaluation import pose_of
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform
-from viewer.rig.srgb import encode_srgb
-from viewer.rig.units import UNIT_NAMES
+from viewer.rigs.arrays import Bytes, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.motion.evaluation import pose_of
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning, deform
+from viewer.rigs.srgb import encode_srgb
+from viewer.rigs.units import UNIT_NAMES
 
 _DIGITS = 9  # significant digits of a number, as most programs read and write
 _PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size

@@ -13,11 +13,11 @@ from viewer.exporters._losses.pose_errors import mesh_losses
 from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, save_bytes
 from viewer.phrases import counted, printable
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.skinning import deform
-from viewer.rig.srgb import encode_srgb
-from viewer.rig.units import UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.skinning import deform
+from viewer.rigs.srgb import encode_srgb
+from viewer.rigs.units import UNIT_NAMES
 
 _PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size
 _TYPES = {"float": "<f4", "double": "<f8"}

@@ -15,12 +15,12 @@ from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, write
 from viewer.formats.pose import read
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
-from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.posing.pose_record import apply_record, record_of
-from viewer.rig.scene import figure_pose
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.arrays import Floats
+from viewer.rigs.pose import Pose, joint_rotations
+from viewer.rigs.posing.pose_record import apply_record, record_of
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skinning import deform, joint_matrices
 
 _TURNED = 1e-6  # difference of rotation matrices, larger than the rounding of angles
 _SAME = 1e-9  # difference of a number up to which it counts as stored

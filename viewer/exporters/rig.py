@@ -22,19 +22,19 @@ from viewer.formats.skin import lost_parts
 from viewer.media.png import encode_png
 from viewer.media.saving import as_words
 from viewer.phrases import Shown, agree, counted, listed
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.kinematics import joint_worlds, world_matrices
-from viewer.rig.mesh import without_seams
-from viewer.rig.motion.evaluation import still_frames
-from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
-from viewer.rig.skin import skin_rows
-from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rigs.hierarchy import depth_first
+from viewer.rigs.kinematics import joint_worlds, world_matrices
+from viewer.rigs.mesh import without_seams
+from viewer.rigs.motion.evaluation import still_frames
+from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import shaped
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
+from viewer.rigs.skin import skin_rows
+from viewer.rigs.skinning import Skinning, deform, joint_matrices, skin_used
 
 _ROUNDED = 1e-5  # scales in files differ from 1 by less than this if they are rounded
 _FLAT = 1e-12  # determinant below which a joint counts as scaled to 0

@@ -25,9 +25,9 @@ from viewer.exporters._family import FamilyFrames, member_of_figure, padded
 from viewer.exporters._options import ExportOptions
 from viewer.exporters.amass import FEWEST, write_layout
 from viewer.phrases import Remedy, counted
-from viewer.rig.arrays import Arrays
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.figure import Figure
+from viewer.rigs.arrays import Arrays
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.figure import Figure
 
 _MEMBER = FAMILY[55]
 _PARTS = {

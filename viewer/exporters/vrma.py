@@ -27,17 +27,17 @@ from viewer.exporters.vrm.humanoid import bone_above, human_bones
 from viewer.exporters.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.quaternion import align_signs
-from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.scene import figure_pose
-from viewer.rig.units import METRES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.quaternion import align_signs
+from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_quaternion
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.motion.evaluation import Frames, frames_of, world_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.units import METRES
 
 _EXTENSION = "VRMC_vrm_animation"
 

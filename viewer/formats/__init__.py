@@ -30,13 +30,13 @@ if TYPE_CHECKING:
         save_parts,
         save_text,
     )
-    from viewer.rig.captures.capture import Capture
-    from viewer.rig.figure import Figure, FigureGroup
-    from viewer.rig.morph_target import MorphTarget
-    from viewer.rig.motion.body_motion import BodyMotion
-    from viewer.rig.motion.clip import Clip
-    from viewer.rig.motion.skeleton_motion import SkeletonMotion
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.captures.capture import Capture
+    from viewer.rigs.figure import Figure, FigureGroup
+    from viewer.rigs.morph_target import MorphTarget
+    from viewer.rigs.motion.body_motion import BodyMotion
+    from viewer.rigs.motion.clip import Clip
+    from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+    from viewer.rigs.posing.pose_record import PoseRecord
 
     Content = (
         Figure
@@ -355,7 +355,7 @@ def read(source: Source) -> Content:
 
 def _read(source: Source) -> Content:
     content: Content = import_module(f"{__name__}.{detect(source)}").read(source)
-    from viewer.rig.figure import Figure, read_from
+    from viewer.rigs.figure import Figure, read_from
 
     if isinstance(content, Figure) and not content.origins:
         return read_from(source.path, content)

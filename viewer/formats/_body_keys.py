@@ -8,7 +8,7 @@ from viewer.diagnostics import wording
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
 from viewer.phrases import Remedy, printable
-from viewer.rig.bodies.smpl_family import gender_of, model_title
+from viewer.rigs.bodies.smpl_family import gender_of, model_title
 
 GENDERS = ("gender", "genders")
 MODELS = ("surface_model_type", "model_type", "body_model", "smpl_type", "model")

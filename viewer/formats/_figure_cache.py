@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.formats._source import Source
-from viewer.rig.figure import Figure
+from viewer.rigs.figure import Figure
 
 _Content = TypeVar("_Content")
 
@@ -59,7 +59,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
         return known.content
     n_found, n_read = len(source.diagnostics), len(source.also_read)
     content = reader(source)
-    from viewer.rig.figure import FigureGroup
+    from viewer.rigs.figure import FigureGroup
 
     if isinstance(content, Figure | FigureGroup):
         also = tuple(source.also_read[n_read:])

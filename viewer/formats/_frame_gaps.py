@@ -16,8 +16,8 @@ from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.phrases import agree, counted, listed, optional
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.person import person_label
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.captures.person import person_label
 
 
 def invalid_rows(*tables: Floats | None) -> Bools:

@@ -22,7 +22,7 @@ from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.media.saving import save_text
 from viewer.phrases import printable, quoted
-from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rigs.retargeting.joint_map import JointMap
 
 _NAME = r'"(?:\\.|[^"\\])*"|[^\s="#](?:(?!\s#)[^="])*?'
 _LINE = re.compile(rf"\s*({_NAME})\s*=\s*({_NAME})?(?:\s+#.*|\s*)")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 
 
 def neutral_positions(positions: Floats, triangles: Ints) -> Floats:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from viewer.formats._source import Source
 from viewer.phrases import counted
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.units import UNIT_NAMES
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.units import UNIT_NAMES
 
 # Maximum for ear clipping, which would take seconds for larger polygons; they become fans.
 _MOST_CORNERS = 400

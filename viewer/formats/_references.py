@@ -20,7 +20,7 @@ from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source, read_bytes
 from viewer.media.image import decode_picture
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 

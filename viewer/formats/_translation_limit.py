@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.phrases import rounded
-from viewer.rig.arrays import Bools
+from viewer.rigs.arrays import Bools
 
 FARTHEST = 1e9
 """Largest translation along an axis, in units of the file."""

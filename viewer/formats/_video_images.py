@@ -7,7 +7,7 @@ from pathlib import Path
 from viewer.diagnostics import note
 from viewer.errors import FormatError
 from viewer.media.video_reading import VideoFrames
-from viewer.rig.captures.cameras import CameraImage
+from viewer.rigs.captures.cameras import CameraImage
 
 
 class VideoImages:
@@ -21,7 +21,7 @@ class VideoImages:
         self._faults: dict[str, None] = {}
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the frame at a time; see ``viewer.rig.captures.cameras``."""
+        """Return the frame at a time; see ``viewer.rigs.captures.cameras``."""
         if camera not in self.cameras:
             return None
         number = round((seconds + self._first) * self._video.rate)

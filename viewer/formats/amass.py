@@ -38,11 +38,11 @@ from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
 from viewer.phrases import counted, listed, one_of
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
-from viewer.rig.geometry.vectors import SIGNED_UPS, StatedUp
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
+from viewer.rigs.geometry.vectors import SIGNED_UPS, StatedUp
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 
 _POSES = ("poses", "pose", "fullpose", "smpl_poses")
 _ROOTS = ("root_orient", "global_orient")

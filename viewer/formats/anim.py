@@ -28,8 +28,8 @@ from viewer.formats._text.words import number_key
 from viewer.formats._translation_limit import FARTHEST
 from viewer.media.saving import save_text
 from viewer.phrases import counted, listed, optional, quoted, rounded
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import (
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import (
     EXTRAPOLATIONS,
     TANGENT_RULES,
     Channel,
@@ -37,7 +37,7 @@ from viewer.rig.motion.clip import (
     Extrapolation,
     Tangent,
 )
-from viewer.rig.number_text import number_text
+from viewer.rigs.number_text import number_text
 
 _MODES: dict[bytes, Extrapolation] = {mode.encode(): mode for mode in EXTRAPOLATIONS}
 _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}

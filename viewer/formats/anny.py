@@ -39,9 +39,9 @@ from viewer.formats._archive.checking import are_indices
 from viewer.formats._source import Source, read_bytes
 from viewer.formats._text.numbers import parse_numbers
 from viewer.phrases import listed, quoted
-from viewer.rig.arrays import Deferred, Floats, Ints
-from viewer.rig.blendshapes import BlendShapes, JointRegressor, regress_joints
-from viewer.rig.bodies.phenotypes import (
+from viewer.rigs.arrays import Deferred, Floats, Ints
+from viewer.rigs.blendshapes import BlendShapes, JointRegressor, regress_joints
+from viewer.rigs.bodies.phenotypes import (
     ORIGINS,
     PHENOTYPES,
     TYPICAL,
@@ -51,13 +51,13 @@ from viewer.rig.bodies.phenotypes import (
     phenotype_range,
     target_masks,
 )
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.retargeting.joint_names import canonical_names
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.retargeting.joint_names import canonical_names
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import Skin, skin_from_entries
 
 # Transform from decimetres with y up to metres with z up, as in Anny.
 _MATRIX = 0.1 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

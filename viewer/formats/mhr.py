@@ -33,17 +33,17 @@ from viewer.formats._archive.checking import (
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source, unreadable
 from viewer.phrases import listed, optional, quoted
-from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.blendshapes import BlendShapes, Correctives
-from viewer.rig.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
-from viewer.rig.bodies.offsets import SparseOffsets
-from viewer.rig.bodies.pose_features import NetworkFeature
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.hierarchy import parent_faults
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.arrays import Deferred, Floats
+from viewer.rigs.blendshapes import BlendShapes, Correctives
+from viewer.rigs.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
+from viewer.rigs.bodies.offsets import SparseOffsets
+from viewer.rigs.bodies.pose_features import NetworkFeature
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.hierarchy import parent_faults
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin, skin_from_entries
 
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")

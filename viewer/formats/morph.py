@@ -21,8 +21,8 @@ from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats.skin.sections import find_block, read_count, read_rows, to_whole
 from viewer.phrases import optional, quoted
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.morph_target import MorphTarget
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.morph_target import MorphTarget
 
 _WIDTH = 4  # index, x, y, z
 _SECTIONS = (b"positions", b"normals")

@@ -35,16 +35,16 @@ from viewer.formats._source import Source
 from viewer.formats._text.words import read_table
 from viewer.media.file_names import folder_name
 from viewer.phrases import listed, optional, printable
-from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import JointRegressor, regress_joints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.hierarchy import parent_faults
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.posing.pose_vector import PoseLayout
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
+from viewer.rigs.annotations import BodyParts, Keypoints, ReducedMesh
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.blendshapes import JointRegressor, regress_joints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.hierarchy import parent_faults
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.posing.pose_vector import PoseLayout
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import Skin, has_influence, skin_from_entries, weight_sums
 
 _Indices = NDArray[np.int64]
 _JOINT, _VERTEX = "joint", "vertex"

@@ -54,13 +54,13 @@ from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import axes, listed, optional, printable, quoted
-from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.bodies.smpl_family import ShapeSpace
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.motion.clip import Clip
-from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
-from viewer.rig.retargeting.pose_transfer import JointRotations
+from viewer.rigs.arrays import Deferred, Floats
+from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.posing.pose_record import PARTS, PosePartError, PoseRecord
+from viewer.rigs.retargeting.pose_transfer import JointRotations
 
 _VERSION = 1  # of the format, the value of "viewer_pose"
 

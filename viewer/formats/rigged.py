@@ -48,17 +48,17 @@ from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
 from viewer.phrases import counted, optional, quoted
-from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Arrays, Bytes, Deferred, Floats, Ints
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.figure import Figure
-from viewer.rig.hands import Hand
-from viewer.rig.hierarchy import parent_faults
-from viewer.rig.material import TEXTURES, Material, Outline, Rim, Texture
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.posing.pose_vector import PoseLayout
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.arrays import Arrays, Bytes, Deferred, Floats, Ints
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.figure import Figure
+from viewer.rigs.hands import Hand
+from viewer.rigs.hierarchy import parent_faults
+from viewer.rigs.material import TEXTURES, Material, Outline, Rim, Texture
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.posing.pose_vector import PoseLayout
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin
 
 _VERSION = 1
 _MOST_HANDS = 2

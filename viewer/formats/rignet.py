@@ -25,8 +25,8 @@ from viewer.diagnostics import Phrase, wording
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST, to_number
 from viewer.phrases import counted, listed, printable, quoted
-from viewer.rig.figure import Figure
-from viewer.rig.skeleton import ball_skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.skeleton import ball_skeleton
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORDS = {b"joints": "a name and 3 numbers", b"root": "a name", b"hier": "a parent and a child"}

@@ -28,9 +28,9 @@ from viewer.formats._source import Source
 from viewer.formats._text.joint_parser import JointParser, Word, called_joint
 from viewer.formats._text.numbers import LARGEST, is_infinite, is_number
 from viewer.phrases import counted, optional, quoted, rounded
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.skeleton import DOF_KINDS, Skeleton, joint_label
 
 _JOINT = b"balljoint"
 _VECTORS = (b"offset", b"boxmin", b"boxmax", b"pose")
@@ -229,7 +229,7 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
-    from viewer.rig.posing.dof_text import beyond_text
+    from viewer.rigs.posing.dof_text import beyond_text
 
     first = int(moved[0])
     beyond = beyond_text(skeleton, first, float(dofs[first]))

@@ -28,17 +28,17 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.phrases import listed
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
-from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
-from viewer.rig.bodies.pose_features import MappedFeature
-from viewer.rig.bodies.smpl_family import ShapeSpace, gender_of
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.hierarchy import parent_faults
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
+from viewer.rigs.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
+from viewer.rigs.bodies.pose_features import MappedFeature
+from viewer.rigs.bodies.smpl_family import ShapeSpace, gender_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.hierarchy import parent_faults
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin, skin_from_entries
 
 _KEYS = (
     "skin_template_v skin_template_f weights shapedirs J_regressor_osim osim_kintree_table "

@@ -33,11 +33,11 @@ from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.phrases import axes, listed, optional, printable, rounded
-from viewer.rig.annotations import Keypoints
-from viewer.rig.arrays import Deferred, Floats, Ints
-from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
-from viewer.rig.bodies.pose_features import QuaternionFeature
-from viewer.rig.bodies.smpl_family import (
+from viewer.rigs.annotations import Keypoints
+from viewer.rigs.arrays import Deferred, Floats, Ints
+from viewer.rigs.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
+from viewer.rigs.bodies.pose_features import QuaternionFeature
+from viewer.rigs.bodies.smpl_family import (
     Animal,
     Member,
     ShapeSpace,
@@ -46,14 +46,14 @@ from viewer.rig.bodies.smpl_family import (
     member_of,
     upright_axis,
 )
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.hands import Hand
-from viewer.rig.hierarchy import parent_faults
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.posing.pose_vector import PoseLayout
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.hands import Hand
+from viewer.rigs.hierarchy import parent_faults
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.posing.pose_vector import PoseLayout
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import Skin, skin_from_entries
 
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""

@@ -10,7 +10,7 @@ from viewer.loading.assembly import assemble, begin
 from viewer.loading.contents import Contents, read_files, read_source
 from viewer.loading.settings import MotionSettings
 from viewer.models import bundled_body, bundled_files, named_files
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 __all__ = [
     "Contents",

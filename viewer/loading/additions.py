@@ -9,10 +9,10 @@ from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import RigError
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents, with_texture
-from viewer.rig.coefficients import space_misfit
-from viewer.rig.pose import Pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record
-from viewer.rig.scene import Actor
+from viewer.rigs.coefficients import space_misfit
+from viewer.rigs.pose import Pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record
+from viewer.rigs.scene import Actor
 
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:

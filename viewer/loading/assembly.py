@@ -28,17 +28,17 @@ from viewer.loading.placing import (
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.phrases import all_of, quoted
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
-from viewer.rig.inspection.faults import faults_of
-from viewer.rig.mesh import hidden_parts
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
+from viewer.rigs.inspection.faults import faults_of
+from viewer.rigs.mesh import hidden_parts
+from viewer.rigs.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.motion.body_motion import BodyMotion
-    from viewer.rig.motion.transform_clip import Animation
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.motion.body_motion import BodyMotion
+    from viewer.rigs.motion.transform_clip import Animation
+    from viewer.rigs.posing.pose_record import PoseRecord
 
 # Single poses of bodies, which become motions of one frame
 _RATE = 30.0  # of a motion with one frame, where it has no effect
@@ -144,8 +144,8 @@ def _lone_poses_as_motions(contents: Contents) -> Contents:
 
 def _lone_motion(path: Path, record: PoseRecord) -> BodyMotion | None:
     """Return a pose as a motion of one frame; None if it is not a pose of a known body."""
-    from viewer.rig.motion.body_motion import BodyMotion
-    from viewer.rig.motion.timing import Timing
+    from viewer.rigs.motion.body_motion import BodyMotion
+    from viewer.rigs.motion.timing import Timing
 
     joints = _lone_joints(record)
     if joints is None or record.scale not in (None, 1.0):
@@ -180,7 +180,7 @@ def _lone_motion(path: Path, record: PoseRecord) -> BodyMotion | None:
 
 def _lone_joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
     """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
-    from viewer.rig.posing.pose_record import PARTS
+    from viewer.rigs.posing.pose_record import PARTS
 
     known, parts = members_by_numbers(), record.parts
     if record.dofs or record.joint_rotations is not None:
@@ -213,7 +213,7 @@ def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
     if not contents.morphs:
         return
     actors = draft.actors
-    from viewer.rig.morph_target import on_one_joint, with_morphs
+    from viewer.rigs.morph_target import on_one_joint, with_morphs
 
     for path, target in contents.morphs:
         problem: RigError | None = None
@@ -259,7 +259,7 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     if wanted or any(actor.figure.animations for actor in draft.actors):
         _animate(draft, wanted)
     if any(actor.clip is not None for actor in draft.actors):
-        from viewer.rig.motion.evaluation import pose_actors, time_span
+        from viewer.rigs.motion.evaluation import pose_actors, time_span
 
         start = time_span(draft.actors)[0]
         pose_actors(draft.actors, start)
@@ -268,7 +268,7 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
 def _animate(draft: SceneDraft, wanted: str) -> None:
     """Let actors without a motion play their file's animation, as ``chosen_animation`` says."""
     # Figures of files without it keep their rest pose.
-    from viewer.rig.motion.animation_choice import NONE, chosen_animation
+    from viewer.rigs.motion.animation_choice import NONE, chosen_animation
 
     by_file: dict[object, list[Actor]] = {}
     for actor in draft.actors:
@@ -297,7 +297,7 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
 def _start(
     draft: SceneDraft, actors: list[Actor], chosen: Animation | None, is_requested: bool
 ) -> None:
-    from viewer.rig.motion.animation_choice import counterpart, own_first, play_animation
+    from viewer.rigs.motion.animation_choice import counterpart, own_first, play_animation
 
     for actor in actors:
         index = -1 if chosen is None else counterpart(actor.figure, chosen)
@@ -360,8 +360,8 @@ def _switch_on_springs(draft: SceneDraft, up: str) -> None:
     skeletons = [(actor, actor.figure.skeleton) for actor in draft.actors]
     if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
         return
-    from viewer.rig.motion.evaluation import pose_actors, time_span
-    from viewer.rig.motion.spring_motion import springs_for
+    from viewer.rigs.motion.evaluation import pose_actors, time_span
+    from viewer.rigs.motion.spring_motion import springs_for
 
     start = time_span(draft.actors)[0]
     for actor in draft.actors:

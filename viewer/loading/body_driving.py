@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.joint_map import JointMap
 
 _ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 

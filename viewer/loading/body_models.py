@@ -18,8 +18,8 @@ from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.models import bundled_body, family_model, models_of_kind, named_files
 from viewer.phrases import Remedy, listed
-from viewer.rig.bodies.smpl_family import ShapeSpace
-from viewer.rig.figure import Figure
+from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.figure import Figure
 
 _ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
 _HIP = "left_hip"

@@ -14,24 +14,24 @@ from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.loading.scaling import scale_to_unit
 from viewer.phrases import Remedy
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.bodies.smpl_family import ShapeSpace
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.motion.body_motion import BodyMotion, body_clip, parameter_clip
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rate
-from viewer.rig.motion.spring_motion import springs_for
-from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.captures.person import is_tracked, person_label
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import rotation_transform
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip, parameter_clip
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rate
+from viewer.rigs.motion.spring_motion import springs_for
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.joint_map import JointMap
+from viewer.rigs.scene import Actor, figure_pose
 
 _COLORS = (
     (0.85, 0.42, 0.28),

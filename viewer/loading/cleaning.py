@@ -12,27 +12,27 @@ from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import RigError
 from viewer.loading.settings import CleanUp
 from viewer.phrases import agree, counted, listed, optional, rounded
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.captures.person import person_label
-from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
-from viewer.rig.cleanup.frames import Captured, resampled, runs_of, trimmed
-from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
-from viewer.rig.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
-from viewer.rig.feet.ground import resting_height
-from viewer.rig.feet.legs import legs_of
-from viewer.rig.feet.planting import lock_feet
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import frames_of, pose_actors, world_frames
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.upright import own_up
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.shape import rest_joints
-from viewer.rig.skeleton import joint_labels
-from viewer.rig.units import METRES
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.captures.person import person_label
+from viewer.rigs.captures.points import PointClip
+from viewer.rigs.cleanup.displacement import joint_displacement, point_displacement
+from viewer.rigs.cleanup.frames import Captured, resampled, runs_of, trimmed
+from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
+from viewer.rigs.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
+from viewer.rigs.feet.ground import resting_height
+from viewer.rigs.feet.legs import legs_of
+from viewer.rigs.feet.planting import lock_feet
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.motion.evaluation import frames_of, pose_actors, world_frames
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.upright import own_up
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.scalars import length_text
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.shape import rest_joints
+from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.units import METRES
 
 Smoothing = OneEuro | SavitzkyGolay
 _ROUNDING = 1e-9  # tolerance, scene or figure units

@@ -17,20 +17,20 @@ from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
 from viewer.phrases import all_of, printable
 from viewer.progress import report
-from viewer.rig.arrays import Bytes
-from viewer.rig.figure import Figure, Origin
-from viewer.rig.material import Material, Texture
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.figure import Figure, Origin
+from viewer.rigs.material import Material, Texture
 
 if TYPE_CHECKING:
     from viewer.formats import Content
     from viewer.formats.rig import NamedFiles
-    from viewer.rig.captures.capture import Capture
-    from viewer.rig.figure import FigureGroup
-    from viewer.rig.morph_target import MorphTarget
-    from viewer.rig.motion.body_motion import BodyMotion
-    from viewer.rig.motion.clip import Clip
-    from viewer.rig.motion.skeleton_motion import SkeletonMotion
-    from viewer.rig.posing.pose_record import PoseRecord
+    from viewer.rigs.captures.capture import Capture
+    from viewer.rigs.figure import FigureGroup
+    from viewer.rigs.morph_target import MorphTarget
+    from viewer.rigs.motion.body_motion import BodyMotion
+    from viewer.rigs.motion.clip import Clip
+    from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+    from viewer.rigs.posing.pose_record import PoseRecord
 
 Place = tuple[Path, int | None, str]
 """File, line and JSON pointer of an element; None or empty if unknown."""
@@ -225,7 +225,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     if kind == "easymocap":
         from viewer.formats import easymocap
         from viewer.formats._body_keys import RATE_REMEDY
-        from viewer.rig.captures.capture import capture_rate
+        from viewer.rigs.captures.capture import capture_rate
 
         source.used_options |= {"images", "video"}
         video = _video_rate(settings)

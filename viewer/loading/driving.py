@@ -33,20 +33,20 @@ from viewer.loading.skeleton_motions import (
     model_refusal,
 )
 from viewer.phrases import Remedy, counted, listed, rounded
-from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
-from viewer.rig.captures.cameras import CameraImages, CameraView
-from viewer.rig.captures.capture import Capture, capture_rate
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
-from viewer.rig.motion.clip import Clip, misfit, suits
-from viewer.rig.motion.evaluation import scene_rate
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.scene import Actor
+from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace
+from viewer.rigs.captures.cameras import CameraImages, CameraView
+from viewer.rigs.captures.capture import Capture, capture_rate
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import rotation_transform
+from viewer.rigs.motion.body_motion import BodyMotion, body_clip, rest_roots
+from viewer.rigs.motion.clip import Clip, misfit, suits
+from viewer.rigs.motion.evaluation import scene_rate
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.scene import Actor
 
 _CAMERA = "video"  # name of the camera for captures that have none
 _SAME_RATE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30
@@ -199,7 +199,7 @@ def _known_joints(
 
 def _judged_up(path: Path, actors: Sequence[Actor], draft: SceneDraft, usual: str = "") -> str:
     """Return the up axis estimated from the people, and record it if it is unusual."""
-    from viewer.rig.motion.upright import guess_up
+    from viewer.rigs.motion.upright import guess_up
 
     up = guess_up(actors)
     if up != usual:

@@ -12,19 +12,19 @@ from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.formats._references import read_picture
 from viewer.phrases import all_of
-from viewer.rig.arrays import Bools, Bytes, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rig.geometry.rotation import matrix_to_quaternion
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rigs.arrays import Bools, Bytes, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton, ball_skeleton
+from viewer.rigs.skin import Skin, skin_from_entries
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -184,7 +184,7 @@ def animate(
     RigError
         If the figure has no skeleton, or shapes do not fit it.
     """
-    from viewer.rig.motion.evaluation import pose_actors
+    from viewer.rigs.motion.evaluation import pose_actors
 
     skeleton = figure.require_skeleton()
     quaternions = _quaternions(rotations, skeleton.n_joints, representation)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from viewer.errors import FormatError, RigError
 from viewer.phrases import Remedy, counted
-from viewer.rig.figure import Figure
+from viewer.rigs.figure import Figure
 
 
 def joined_figures(

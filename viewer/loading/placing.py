@@ -9,14 +9,14 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.loading.scaling import known_unit, scale_to_unit, scaling
 from viewer.loading.scene_draft import SceneDraft
-from viewer.rig.geometry.transform import rotation_transform, translation_matrix
-from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
-from viewer.rig.units import METRES
+from viewer.rigs.geometry.transform import rotation_transform, translation_matrix
+from viewer.rigs.scene import Actor, Scene, scene_box, scene_unit
+from viewer.rigs.units import METRES
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.captures.cameras import CameraView
-    from viewer.rig.figure import FigureGroup
+    from viewer.rigs.captures.cameras import CameraView
+    from viewer.rigs.figure import FigureGroup
 
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
@@ -101,6 +101,6 @@ def placed_views(draft: SceneDraft) -> list[CameraView]:
     placed += [(group.views, placement) for group, placement in placements.items()]
     if not any(views for views, _ in placed):
         return []
-    from viewer.rig.captures.cameras import placed_view
+    from viewer.rigs.captures.cameras import placed_view
 
     return [placed_view(view, placement) for views, placement in placed for view in views]

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, note
-from viewer.rig.arrays import Floats
-from viewer.rig.scene import Actor
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.scene import Actor
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 
 def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
-from viewer.rig.scene import Actor, free_title
+from viewer.rigs.scene import Actor, free_title
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.captures.cameras import CameraImages, CameraView
-    from viewer.rig.figure import FigureGroup
+    from viewer.rigs.captures.cameras import CameraImages, CameraView
+    from viewer.rigs.figure import FigureGroup
 
 
 @dataclass(slots=True)

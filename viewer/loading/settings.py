@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass, setting
-from viewer.rig.bodies.smpl_family import GENDERS
-from viewer.rig.geometry.vectors import SIGNED_UPS, StatedUp
-from viewer.rig.units import METRES
+from viewer.rigs.bodies.smpl_family import GENDERS
+from viewer.rigs.geometry.vectors import SIGNED_UPS, StatedUp
+from viewer.rigs.units import METRES
 
 if TYPE_CHECKING:
-    from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
-    from viewer.rig.retargeting.joint_map import JointMap
+    from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay
+    from viewer.rigs.retargeting.joint_map import JointMap
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,19 +21,19 @@ from viewer.formats import Source
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.phrases import Remedy
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure, FigureGroup, read_from
-from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.motion.animation_choice import chosen_animation
-from viewer.rig.motion.sampled_animation import baked
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.retarget import scaled_motion
-from viewer.rig.retargeting.source_rest import rest_fault
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.units import METRES, is_metres
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure, FigureGroup, read_from
+from viewer.rigs.geometry.transform import rotation_transform
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.motion.animation_choice import chosen_animation
+from viewer.rigs.motion.sampled_animation import baked
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.retarget import scaled_motion
+from viewer.rigs.retargeting.source_rest import rest_fault
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.units import METRES, is_metres
 
 if TYPE_CHECKING:
     from viewer.formats import Content

@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.media.picture_sinks import sheet_layout
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 if TYPE_CHECKING:
     from PIL import ImageDraw, ImageFont

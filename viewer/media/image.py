@@ -16,7 +16,7 @@ from viewer.diagnostics import wording
 from viewer.errors import FormatError, OutputError
 from viewer.media.png import encode_png
 from viewer.phrases import printable
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 if TYPE_CHECKING:
     from PIL import Image

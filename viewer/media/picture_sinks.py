@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.errors import ViewerError
 from viewer.media.image import save_image
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _MOST_WORKERS = 4  # maximum number of images compressed at the same time
 _SMALLEST_CELL = 16  # minimum side of a cell, pixels

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SUB = 1

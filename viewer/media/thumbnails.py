@@ -15,7 +15,7 @@ from viewer.errors import FormatError, ViewerError
 from viewer.media.image import decode_picture, is_picture
 from viewer.media.video_kinds import VIDEOS
 from viewer.media.video_reading import VideoFrames
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _QUALITY = 82  # JPEG quality
 _MOST_BYTES = 256 << 20  # maximum size of a file

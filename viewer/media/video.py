@@ -24,7 +24,7 @@ from viewer.errors import OutputError, ViewerError
 from viewer.media.saving import Replacement
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, VideoKind, video_kind
 from viewer.phrases import printable
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -13,7 +13,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
 from viewer.errors import FormatError, ViewerError
 from viewer.phrases import Remedy
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures
 _BYTES = 96_000_000  # size of the cache of decoded frames, which makes stepping back fast

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import bounding_box, box_size
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import bounding_box, box_size
 
 with warnings.catch_warnings():
     # pyrr's docstrings have invalid escapes: compiling it warns, or fails if warnings are errors.
@@ -21,9 +21,9 @@ with warnings.catch_warnings():
     from pyrr import matrix44
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.cameras import CameraView
-    from viewer.rig.inspection.front import Front
-    from viewer.rig.scene import Scene
+    from viewer.rigs.captures.cameras import CameraView
+    from viewer.rigs.inspection.front import Front
+    from viewer.rigs.scene import Scene
 
 
 NamedView: TypeAlias = Literal["front", "back", "right", "left", "top", "bottom"]
@@ -267,7 +267,7 @@ def follow_view(
     fixed = camera.fixed
     if fixed is None or (fixed.motion is None and fixed.mount is None):
         return
-    from viewer.rig.captures.carried_view import view_in
+    from viewer.rigs.captures.carried_view import view_in
 
     there = camera_from_view(fixed, size, camera.up, box, view_in(fixed, scene))
     camera.target, camera.distance, camera.seen = there.target, there.distance, there.seen

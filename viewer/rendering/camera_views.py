@@ -23,13 +23,13 @@ from viewer.rendering.pinhole import (
 )
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.overlay.annotation import Annotation
-    from viewer.rig.captures.cameras import CameraImage, CameraView
+    from viewer.rigs.captures.cameras import CameraImage, CameraView
 
 _FRAMED = 24  # number of framed positions along the path of a moving camera
 # Frusta.
@@ -49,7 +49,7 @@ def drawn_cameras(
     """Return the cameras whose frusta are drawn, at the scene's time: all except the one in use."""
     if not options.cameras or not scene.views:
         return []
-    from viewer.rig.captures.carried_view import view_in
+    from viewer.rigs.captures.carried_view import view_in
 
     return [view_in(camera, scene) for camera in scene.views if camera is not view_through]
 
@@ -72,8 +72,8 @@ def with_cameras(
     # they are in some poses of the scene; without these, where they are now.
     if not options.cameras or not scene.views:
         return points
-    from viewer.rig.captures.cameras import motion_times, view_at
-    from viewer.rig.captures.carried_view import view_in
+    from viewer.rigs.captures.cameras import motion_times, view_at
+    from viewer.rigs.captures.carried_view import view_in
 
     cameras = [
         view_at(camera, seconds)

@@ -32,13 +32,13 @@ from viewer.rendering.visibility import (
     with_points,
     with_skeleton,
 )
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped, shaped_skeleton
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import shaped, shaped_skeleton
 
 _BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
 _sizes: Memo[Figure, float] = Memo()

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 
 from viewer.resources import resource
-from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.srgb import decode_srgb, encode_srgb
+from viewer.rigs.arrays import Bytes, Floats, Ints
+from viewer.rigs.srgb import decode_srgb, encode_srgb
 
 _GOLDEN = 0.618033988749895  # spacing of hues, which never repeat
 

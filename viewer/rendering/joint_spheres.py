@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.memo import Memo
-from viewer.rig.skin import Skin, bind_positions, owners
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import Memo
+from viewer.rigs.skin import Skin, bind_positions, owners
 
 _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
 _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()

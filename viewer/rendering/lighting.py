@@ -15,8 +15,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import Effects, Shadow, View, key_direction
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.vectors import Up
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.vectors import Up
 
 if TYPE_CHECKING:
     from viewer.rendering.casters import Casters

@@ -15,10 +15,10 @@ from viewer.rendering.gpu.target import Target, check_size
 from viewer.rendering.options import SIZE, DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.inspection.front import guess_front
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Scene, Shown, scene_points
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.inspection.front import guess_front
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import Scene, Shown, scene_points
 
 _thread = threading.local()
 _BAND = 32  # number of rows that are exchanged at once, so that they stay in the processor's cache

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
-from viewer.rig.skinning import Skinning
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
-    from viewer.rig.scene import Shown
-    from viewer.rig.skeleton import Skeleton
+    from viewer.rigs.scene import Shown
+    from viewer.rigs.skeleton import Skeleton
 
 Color = tuple[float, float, float]
 Shading: TypeAlias = Literal[
@@ -145,7 +145,7 @@ class DisplayOptions:
     scalar: str = setting(
         "weight", "show a scalar quantity as colours", given=None, metavar="NAME[:JOINT]"
     )
-    """Quantity for the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``. For a
+    """Quantity for the shading ``"scalar"``: a key of ``viewer.rigs.scalars.SCALARS``. For a
     quantity of one joint, a colon and the joint may follow (``"weight:left_knee"``,
     ``"weight:#4"``); by default the selected joint is used."""
     scalar_range: tuple[float, float] | None = setting(

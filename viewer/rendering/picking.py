@@ -31,9 +31,9 @@ from viewer.rendering.visibility import (
     with_points,
     with_skeleton,
 )
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.scene import Actor, Scene
 
 _REACH = 3  # search radius around the requested pixel, pixels
 _SIDE = 2 * _REACH + 1

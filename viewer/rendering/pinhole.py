@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import box_size
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import box_size
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.cameras import CameraView
+    from viewer.rigs.captures.cameras import CameraView
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
 _UNBOUNDED = 1e9  # value that replaces an infinite distortion

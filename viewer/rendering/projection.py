@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.view import View
-from viewer.rig.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats
 
 _USUAL_HEIGHT = 720.0  # height of an image in which marks have their standard size, pixels
 _SCALES = 0.8, 4.0

@@ -44,8 +44,8 @@ from viewer.rendering.visibility import (
     with_points,
     with_skeleton,
 )
-from viewer.rig.arrays import Floats
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.overlay.annotation import Annotation, Marks

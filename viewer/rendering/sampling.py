@@ -15,8 +15,8 @@ from viewer.data_classes import dataclass
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.view import View, light_axes
-from viewer.rig.arrays import Floats
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.scene import Scene
 
 _LIGHT_RADIUS = math.tan(math.radians(1.7))  # radius of the key light's disc, at distance 1
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))

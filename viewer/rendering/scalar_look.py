@@ -17,10 +17,10 @@ from viewer.rendering.colors import (
     part_palette,
 )
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
-from viewer.rig.srgb import decode_srgb
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.scalars import categories, find_quantity, shown_unit, split_name
+from viewer.rigs.srgb import decode_srgb
 
 TYPICAL = 0.99
 """Minimum fraction of the nonzero values that a robust range contains."""

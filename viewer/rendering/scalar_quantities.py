@@ -11,12 +11,12 @@ import numpy as np
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.upload import float32, ramp_texture, reserved
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.pose import Pose, pose_key
-from viewer.rig.scalars import compute, find_quantity, joint_text, missing_part
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.pose import Pose, pose_key
+from viewer.rigs.scalars import compute, find_quantity, joint_text, missing_part
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.rendering.overlay.legend import Legend

@@ -17,9 +17,9 @@ from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.gpu.program import has_uniform, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.options import Light, Lights
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.geometry.vectors import cross
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.geometry.vectors import cross
 
 _LARGEST = 1e30  # maximum of entries of normal matrices, well within the range of float32
 SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # texture units; materials and skinning use the lower ones

@@ -14,11 +14,11 @@ from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped_skeleton
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import shaped_skeleton
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def update_skeletons(
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
-        from viewer.rig.motion.instances import posed_worlds
+        from viewer.rigs.motion.instances import posed_worlds
 
         poses = [pose for _, pose in group]
         skeleton = shaped_skeleton(group[0][0].figure, poses[0].shape_weights)

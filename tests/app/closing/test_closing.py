@@ -11,7 +11,7 @@ from app.curves.plotted import _center
 from app.retargeting.driven import driven_scene
 from imgui_bundle import imgui
 from PIL import Image
-from rig.animated import animated_leg
+from rigs.animated import animated_leg
 
 import viewer
 from viewer.app.closing import Closing, request_quit, unsaved_edits
@@ -39,7 +39,7 @@ from viewer.app.retargeting.joint_match_panel import (
 from viewer.formats import Source, read
 from viewer.media.saving import save_text
 from viewer.progress import report
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene
 
 WAIT, CANCEL, GO_ON = "Finish first", "Cancel export and quit", "Keep working"
 SAVE, DISCARD, STAY = "Save…", "Discard", "Cancel##closing"

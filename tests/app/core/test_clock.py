@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from viewer.app.core.clock import Clock
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 
 def keyed(start=1.0, end=5.0):

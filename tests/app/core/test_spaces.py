@@ -13,10 +13,10 @@ from viewer.loading import assembly
 from viewer.loading.cleaning import clean_up
 from viewer.loading.contents import Contents
 from viewer.loading.settings import CleanUp, MotionSettings
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.timing import Timing
 
 K = np.array([[100.0, 0.0, 32.0], [0.0, 100.0, 24.0], [0.0, 0.0, 1.0]])
 PLACES = {"world": 0.0, "camera": 5.0}

@@ -8,8 +8,8 @@ import viewer
 from viewer.app.core.scene_version import version_of
 from viewer.app.core.undo_history import History
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.motion.clip import Clip
-from viewer.rig.scene import Actor
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.scene import Actor
 
 ARRAYS = (
     "dofs",

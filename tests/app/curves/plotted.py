@@ -5,7 +5,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.rig.motion.clip import Clip
+from viewer.rigs.motion.clip import Clip
 
 ARM_X = 6  # rows of the tiny rig: three translations, three rotations of the root, then the arm
 SIZE = (1180, 900)

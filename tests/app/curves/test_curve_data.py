@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from app.curves.plotted import ARM_X, _center, _pick, _type_into
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.animated import animated_leg
-from rig.hand_made import skeleton
+from rigs.animated import animated_leg
+from rigs.hand_made import skeleton
 
 from viewer.app.core.undo_actions import undo
 from viewer.app.curves import plot
@@ -22,12 +22,12 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.posing.toolbar import no_keys
 from viewer.loading import Contents, begin
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 
 def rig():

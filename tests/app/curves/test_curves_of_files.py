@@ -11,11 +11,11 @@ import viewer
 from viewer.app.curves.editing import Curves
 from viewer.app.files.files import Files
 from viewer.formats import Source, read
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 # Keys of whole poses, and files
 
@@ -150,7 +150,7 @@ def test_selection_resets_with_another_actor(drive, rig, tmp_path):
 
 
 def test_thousands_of_keys_are_drawn_but_cannot_be_dragged(curves):
-    from viewer.rig.motion.clip_edit import clip_from_frames
+    from viewer.rigs.motion.clip_edit import clip_from_frames
 
     times = np.linspace(0, 2, 4000)
     dofs = np.tile(curves.dofs(), (4000, 1))

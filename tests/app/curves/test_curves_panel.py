@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.curves.data import curves_of
 from viewer.app.curves.editing import Curves
 from viewer.app.curves.plot import unit_text, value_limits
-from viewer.rig.motion.clip import evaluate
+from viewer.rigs.motion.clip import evaluate
 
 
 def _chosen(hand):

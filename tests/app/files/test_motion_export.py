@@ -28,9 +28,9 @@ from viewer.exporters import obj
 from viewer.formats import save_bytes
 from viewer.media.saving import save_text
 from viewer.progress import report
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.scene import Actor, Scene
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from viewer.errors import RenderError, ViewerError
 from viewer.loading import load, read_files
 from viewer.progress import Cancelled, report
 from viewer.rendering.gpu.index_sets import curve_order
-from viewer.rig.pose import pose_key
+from viewer.rigs.pose import pose_key
 
 
 def _open(hand, *paths):

@@ -8,24 +8,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from lint.planted import weighted
-from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
-from lint.test_rechecks import TEXTS
-from rig.animated import animated_leg, bow, channel, clip_of
+from linting.planted import weighted
+from linting.sound import FRAMES, RATE, column, keypoints, scene_of, standing
+from linting.test_rechecks import TEXTS
+from rigs.animated import animated_leg, bow, channel, clip_of
 
 from viewer.app.layout import ShownPanels
 from viewer.app.linting.lint_panel import Linting, check_rig, start_check
 from viewer.app.linting.marks import marks_of
 from viewer.cli import run
-from viewer.lint import Places, describe, lint_scene
+from viewer.linting import Places, describe, lint_scene
 from viewer.loading import bundled_files
 from viewer.progress import report
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.overlay.annotation import MARK_COLOR
-from viewer.rig.figure import Figure
-from viewer.rig.motion.animation_choice import play_animation
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.animation_choice import play_animation
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
 SIZE = (1000, 700)
@@ -597,7 +597,7 @@ def hold_checks(monkeypatch):
         seen.append(scene)
         return lint_scene(scene, options)
 
-    monkeypatch.setattr("viewer.lint._files.lint_scene", held)
+    monkeypatch.setattr("viewer.linting._files.lint_scene", held)
     return go, seen, is_held
 
 

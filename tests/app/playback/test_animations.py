@@ -8,7 +8,7 @@ import pytest
 from app.core.test_view_fit import reach
 from app.curves.plotted import _pick
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.animated import animated_leg, animation, bow, channel, clip_of, leg, wave
+from rigs.animated import animated_leg, animation, bow, channel, clip_of, leg, wave
 
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.features import entries
@@ -16,9 +16,9 @@ from viewer.app.playback.animations import choose_animation, played
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.loading import Contents, begin
-from viewer.rig.figure import read_from
-from viewer.rig.motion.transform_clip import Animation
-from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rigs.figure import read_from
+from viewer.rigs.motion.transform_clip import Animation
+from viewer.rigs.scene import Actor, Scene, figure_pose
 
 SIZE = (1180, 760)
 

@@ -11,9 +11,9 @@ from viewer.app.core.undo_history import History
 from viewer.app.files.files import keep_rate
 from viewer.app.playback.timeline_panel import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.sampled_clip import with_rate
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import with_rate
+from viewer.rigs.scene import Actor, Scene
 
 SIZE = (1280, 800)
 

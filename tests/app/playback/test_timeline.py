@@ -7,19 +7,19 @@ import pytest
 from app.captured import people, walk
 from app.curves.plotted import SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.animated import animated_leg, wave
+from rigs.animated import animated_leg, wave
 
 from viewer.app.core.clock import MODES, Clock
 from viewer.app.files.files import Files, Stream, stream_captures
 from viewer.app.playback.tracks import bars, key_times, present_spans, ruler_text_place
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
-from viewer.rig.srgb import decode_color, encode_color
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
+from viewer.rigs.srgb import decode_color, encode_color
 
 ARM = 0  # the DOF that the test's clip moves
 
@@ -177,7 +177,7 @@ def streaming(drive_body):
         figure = hand.state.actor.figure
         builder = Builder(taken, figure)
         builder.read_some()
-        from viewer.rig.scene import Scene
+        from viewer.rigs.scene import Scene
 
         scene = Scene(list(builder.actors))
         hand.state.show_scene(scene, ())

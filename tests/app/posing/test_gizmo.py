@@ -15,9 +15,9 @@ from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
 from viewer.loading import bundled_files
 from viewer.rendering.camera import camera_axes
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.scene import Actor, Scene
 
 VIEW_RADIUS = 1.2 * RADIUS
 

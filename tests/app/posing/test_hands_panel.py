@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 
 from viewer.app.layout import ShownPanels
 from viewer.app.posing.posing import Posing
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector
-from viewer.rig.pose import joint_rotations
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector
+from viewer.rigs.pose import joint_rotations
+from viewer.rigs.scene import Actor, Scene
 
 
 @pytest.fixture

@@ -17,10 +17,10 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.joints_panel import joint_rows
 from viewer.app.posing.move_tool import shift_text
 from viewer.app.posing.posed_joint import posed_joint
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.pose import joint_rotations, placement_matrix
-from viewer.rig.scene import Actor
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.pose import joint_rotations, placement_matrix
+from viewer.rigs.scene import Actor
 
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.files.files import Files
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.formats.pose import pose_text
-from viewer.rig.pose import joint_rotations, pose_key, rest_pose
-from viewer.rig.posing.pose_record import record_of
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.pose import joint_rotations, pose_key, rest_pose
+from viewer.rigs.posing.pose_record import record_of
+from viewer.rigs.scene import Actor, Scene
 
 
 @pytest.fixture

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.app.posing.posing import Posing
-from viewer.rig.figure import Figure
-from viewer.rig.inspection.measure import measure
-from viewer.rig.mesh import Mesh
-from viewer.rig.morph_target import MorphTarget, with_morphs
-from viewer.rig.scene import Actor
-from viewer.rig.shape import rest_joints, shaped
+from viewer.rigs.figure import Figure
+from viewer.rigs.inspection.measure import measure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.morph_target import MorphTarget, with_morphs
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import rest_joints, shaped
 
 
 @pytest.fixture

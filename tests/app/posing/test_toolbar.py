@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
 from viewer.app.posing.toolbar import no_chain, no_keys, no_orientation, no_tool
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.pose import joint_rotations
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.pose import joint_rotations
+from viewer.rigs.scene import Actor, Scene
 
 
 def waving():

@@ -23,9 +23,9 @@ from viewer.app.posing.move_tool import (
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.posing.rotate_tool import RADIUS, RotateHandle, circle, grab_ring, limit_text, rings
 from viewer.rendering.camera import Camera
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.pose import joint_rotations
-from viewer.rig.scene import Actor
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.pose import joint_rotations
+from viewer.rigs.scene import Actor
 
 BOX = np.array([[-1.0, -1, -1], [3, 1, 1]])
 

@@ -17,8 +17,8 @@ from viewer.app.recording.recording import (
 from viewer.app.weights.weights_panel import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actors
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.evaluation import pose_actors
 
 
 @pytest.fixture

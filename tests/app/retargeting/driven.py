@@ -1,10 +1,10 @@
 """A scene whose figure is driven by a capture with an unrecognised elbow name and a tail."""
 
-from rig.retargeting.two_people import BODY, HIK, figure_of, moving
+from rigs.retargeting.two_people import BODY, HIK, figure_of, moving
 
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.scene import Actor, Scene
 
 NAMES = {"RightForeArm": "rEllbogen_x"}
 

@@ -7,10 +7,10 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from rig.retargeting.hanging_arms import body, motion
-from rig.retargeting.rest_twins import t_pose, written
-from rig.retargeting.two_people import BODY, figure_of
-from rig.retargeting.walking import RATE, walk
+from rigs.retargeting.hanging_arms import body, motion
+from rigs.retargeting.rest_twins import t_pose, written
+from rigs.retargeting.two_people import BODY, figure_of
+from rigs.retargeting.walking import RATE, walk
 
 from viewer.app.core.reasons import no_undo
 from viewer.app.core.undo_actions import undo
@@ -26,17 +26,17 @@ from viewer.app.retargeting.drive_changes import (
 from viewer.formats import Source, read
 from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.sampled_clip import with_rate
-from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.driven_feet import plant_feet
-from viewer.rig.retargeting.retarget import retarget
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.sampled_clip import with_rate
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.driven_feet import plant_feet
+from viewer.rigs.retargeting.retarget import retarget
+from viewer.rigs.scene import Actor, Scene
 
-driven_clip_module = import_module("viewer.rig.retargeting.driven_clip")
+driven_clip_module = import_module("viewer.rigs.retargeting.driven_clip")
 
 
 @pytest.fixture

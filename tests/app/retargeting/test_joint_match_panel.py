@@ -25,7 +25,7 @@ from viewer.app.retargeting.joint_match_panel import (
 )
 from viewer.formats import Source
 from viewer.formats._joint_map import read_joint_map
-from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.driven_clip import driven_clip
 
 SIZE = (1000, 900)
 

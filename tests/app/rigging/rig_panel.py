@@ -2,8 +2,8 @@
 
 from viewer.app.rigging.results import plays_motion, plays_trial
 from viewer.app.rigging.rigging import Rigging
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.skinning import deform
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.skinning import deform
 
 SIZE = (1000, 1250)
 

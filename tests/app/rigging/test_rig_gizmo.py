@@ -21,8 +21,8 @@ from viewer.app.rigging.placing import (
 from viewer.app.rigging.rigging import Rigging, current_template, target_mesh
 from viewer.app.rigging.tools import RADIUS
 from viewer.app.rigging.work import align_template
-from viewer.rig.geometry.transform import apply_transform, translation_matrix
-from viewer.rig.mesh import bounding_box
+from viewer.rigs.geometry.transform import apply_transform, translation_matrix
+from viewer.rigs.mesh import bounding_box
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
 

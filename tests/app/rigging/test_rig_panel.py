@@ -19,12 +19,12 @@ from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.motion.clip import sample
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.motion.clip import sample
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
 

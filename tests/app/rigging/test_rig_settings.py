@@ -24,9 +24,9 @@ from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.exporters import export
 from viewer.formats.rigged import save
 from viewer.progress import report_fraction
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.scene import Actor, Scene, actor_points
-from viewer.rig.skinning import deform
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.scene import Actor, Scene, actor_points
+from viewer.rigs.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
 

@@ -14,7 +14,7 @@ from viewer.app.weights.weights_panel import Weights
 from viewer.rendering.camera import VIEWS, eye
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, SHOWN, Lights
-from viewer.rig.scene import Actor
+from viewer.rigs.scene import Actor
 
 
 @pytest.fixture

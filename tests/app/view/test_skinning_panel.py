@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from viewer.rig.scalars import compute
-from viewer.rig.skinning import Skinning
+from viewer.rigs.scalars import compute
+from viewer.rigs.skinning import Skinning
 
 
 @pytest.fixture

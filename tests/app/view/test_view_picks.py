@@ -17,9 +17,9 @@ from viewer.app.view.picks import take_pick
 from viewer.app.weights.weights_panel import Weights
 from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rendering.picking import Pick
-from viewer.rig.annotations import BodyParts, ReducedMesh
-from viewer.rig.scene import actor_points
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.annotations import BodyParts, ReducedMesh
+from viewer.rigs.scene import actor_points
+from viewer.rigs.skinning import deform, joint_matrices
 
 
 @pytest.fixture
@@ -377,8 +377,8 @@ def test_click_on_the_background_has_no_effect(pair):
 def test_click_on_a_joint_selects_it(pair):
     pair.state.options.show = "skeleton"
     pair.step(2)
-    from viewer.rig.geometry.transform import apply_transform
-    from viewer.rig.skinning import joint_matrices
+    from viewer.rigs.geometry.transform import apply_transform
+    from viewer.rigs.skinning import joint_matrices
 
     actor = pair.state.scene.actors[1]
     joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]

@@ -12,8 +12,8 @@ from viewer.app.weights.vertex_panel import influence_colors, matrix_text, verte
 from viewer.app.weights.weights_panel import Weights, pin_vertex
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
-from viewer.rig.inspection.explanation import explain, explanation_text
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rigs.inspection.explanation import explain, explanation_text
+from viewer.rigs.skinning import Skinning, deform, joint_matrices
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from numpy.testing import assert_array_equal
 from viewer.app.preferences.preferences import Appearance
 from viewer.app.weights.weights_panel import no_view, start_heat_map, toggle_weights
 from viewer.rendering.colors import colormap
-from viewer.rig.annotations import VertexField
-from viewer.rig.scalars import (
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.scalars import (
     SCALARS,
     compute,
     informative_quantity,
@@ -20,8 +20,8 @@ from viewer.rig.scalars import (
     missing_part,
     most_influential,
 )
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from viewer.autorig.alignment.anatomy_fit import left_of, starts_of, template_body
 from viewer.autorig.anatomy import anatomy_of
 from viewer.loading import bundled_body, load
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
-from viewer.rig.skin import owners, skin_from_entries
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skin import owners, skin_from_entries
 
 # The body's x, y, z, where its left is +x and its front +z, in a template.
 ROTATIONS = {

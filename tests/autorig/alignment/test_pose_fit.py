@@ -18,10 +18,10 @@ from viewer.autorig.alignment.pose_fit import (
 from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.progress import receiving
-from viewer.rig.geometry.closest_point import Surface
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.skinning import deform
+from viewer.rigs.geometry.closest_point import Surface
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.pose import joint_rotations, rest_pose
+from viewer.rigs.skinning import deform
 
 ROTATION = turn([0.2, 1, 0.3], 1.5)
 START = Similarity(20.0, ROTATION, np.array([3.0, 4.0, 5.0]), np.ones(3))

@@ -14,8 +14,8 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
-from viewer.rig.pose import rest_pose
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skinning import deform, joint_matrices
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 

@@ -17,7 +17,7 @@ from viewer.autorig.alignment.icp import (
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.seed import align_boxes
 from viewer.errors import RigError
-from viewer.rig.geometry.transform import apply_transform
+from viewer.rigs.geometry.transform import apply_transform
 
 START = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
 FACTORS = np.array([1.2, 1.0, 0.9])

@@ -16,7 +16,7 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
-from viewer.rig.mesh import vertex_normals
+from viewer.rigs.mesh import vertex_normals
 
 pytestmark = pytest.mark.slow
 

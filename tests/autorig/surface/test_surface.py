@@ -14,7 +14,7 @@ from viewer.autorig.surface.samples import even_vertices, sample_surface, triang
 from viewer.autorig.surface.welding import edges, islands, weld
 from viewer.autorig.transfer.joint_transfer import winding_numbers
 from viewer.errors import RigError
-from viewer.rig.mesh import triangle_areas
+from viewer.rigs.mesh import triangle_areas
 
 ROUNDING = 1e-12
 

@@ -9,11 +9,11 @@ from viewer.autorig.rigged import transfer_clip
 from viewer.autorig.transfer import corrective_transfer
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.errors import RigError
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.geometry.closest_point import SurfacePoints
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.geometry.closest_point import SurfacePoints
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 
 SKELETON = arm().skeleton  # DOFs 0 to 2 translate, the remaining DOFs rotate
 

@@ -17,12 +17,12 @@ from viewer.autorig.transfer.joint_transfer import (
     transfer_joints,
 )
 from viewer.autorig.transfer.rest_skeleton import fit_rest_skeleton, leg_scale
-from viewer.rig.blendshapes import JointRegressor
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.pose import placement_matrix, rest_pose
-from viewer.rig.skeleton import Skeleton, ball_skeleton
-from viewer.rig.skin import bind_positions, skin_from_lists
+from viewer.rigs.blendshapes import JointRegressor
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.pose import placement_matrix, rest_pose
+from viewer.rigs.skeleton import Skeleton, ball_skeleton
+from viewer.rigs.skin import bind_positions, skin_from_lists
 
 PARENTS = np.array([-1, 0, 1])
 JOINTS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0]])

@@ -22,9 +22,9 @@ from viewer.autorig.weights.weight_transfer import (
 )
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
-from viewer.rig.geometry.closest_point import SurfacePoints
-from viewer.rig.mesh import Mesh
-from viewer.rig.skin import Skin, skin_from_entries, skin_from_lists
+from viewer.rigs.geometry.closest_point import SurfacePoints
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.skin import Skin, skin_from_entries, skin_from_lists
 
 BIND = np.tile(np.eye(4), (3, 1, 1))
 

@@ -10,8 +10,8 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
 
 __all__ = ["LeastFrame"]
 

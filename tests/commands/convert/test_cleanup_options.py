@@ -12,7 +12,7 @@ from viewer.commands._cleanup import clean_up_of
 from viewer.commands._scene import add_gap_arguments
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
-from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
+from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 
 def parsed(*arguments):

@@ -16,10 +16,10 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings, load
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning, deform
 
 
 @pytest.fixture

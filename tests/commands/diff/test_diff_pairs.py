@@ -3,13 +3,13 @@
 import numpy as np
 
 from viewer.commands.diff import pair_actors
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import skin_from_lists
 
 
 def bones() -> Skeleton:

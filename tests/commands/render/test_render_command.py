@@ -16,7 +16,7 @@ from viewer.cli import run
 from viewer.commands._pose import apply_dofs
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import scene_points
+from viewer.rigs.scene import scene_points
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[3]

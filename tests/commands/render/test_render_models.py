@@ -10,7 +10,7 @@ from formats.synthetic_smpl import model
 from PIL import Image
 
 from viewer.cli import run
-from viewer.rig.scalars import SCALARS
+from viewer.rigs.scalars import SCALARS
 
 pytestmark = pytest.mark.slow
 

@@ -17,12 +17,12 @@ from viewer.cli import run
 from viewer.commands._frames import Numbering, Range, numbering_of, parse_range
 from viewer.commands._sequence import Turntable, parse_turntable
 from viewer.errors import OutputError, ViewerError
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor
 
 pytestmark = pytest.mark.slow
 av = pytest.importorskip("av")

@@ -17,12 +17,12 @@ import viewer
 from viewer.exporters import export
 from viewer.formats._source import Source
 from viewer.formats.gltf import read_nodes
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.evaluation import frames_of, pose_of
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.evaluation import frames_of, pose_of
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning, deform
 
 PIXELS = np.arange(48, dtype=np.uint8).reshape(3, 4, 4) | 128
 

@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from two_parts import clips, quaternions, two_parts
 
 import viewer
-from viewer.rig.motion.evaluation import frames_of, pose_of
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.motion.evaluation import frames_of, pose_of
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import Skinning, deform
 
 CLOSE = 1e-6  # relative to the size of 2 units, for single precision
 

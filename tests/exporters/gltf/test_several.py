@@ -15,14 +15,14 @@ from two_parts import clips, two_parts
 import viewer
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, Part, Selection, export
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.motion.evaluation import frames_of, pose_actors, pose_of
-from viewer.rig.motion.sampled_animation import upright_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import deform
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.motion.evaluation import frames_of, pose_actors, pose_of
+from viewer.rigs.motion.sampled_animation import upright_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import deform
 
 SINGLE = 2e-6  # for lengths up to 5
 # A rotation by 90 degrees about y with a translation; the second figure is in centimetres with z

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import FileRecord
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.transform_clip import Animation, TransformChannel, TransformClip
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_entries
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import FileRecord
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_entries
 
 
 def quaternions(*degrees: float) -> np.ndarray:

@@ -16,16 +16,16 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, Part, Selection, export
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import pose_of
-from viewer.rig.motion.sampled_animation import sample_animation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
-from viewer.rig.skinning import Skinning, deform
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.motion.evaluation import pose_of
+from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin
+from viewer.rigs.skinning import Skinning, deform
 
 HOSTILE = "</script><script>document.title='broken'</script>"
 EXACT = 1e-5  # of the figure's size, the accuracy that pages promise
@@ -142,7 +142,7 @@ def test_shapes_and_correctives_move_the_rest_vertices(browser, tmp_path):
     plain = tangle(n_joints=4, n_influences=2)
     random = np.random.default_rng(9)
     shapes = BlendShapes(("a", "b", "c"), random.normal(size=(3, 90, 3)) * 0.1)
-    correctives = viewer.rig.blendshapes.Correctives(random.normal(size=(27, 90, 3)) * 0.05)
+    correctives = viewer.rigs.blendshapes.Correctives(random.normal(size=(27, 90, 3)) * 0.05)
     figure = replace(plain, blend_shapes=shapes, correctives=correctives)
     weights = random.normal(size=(5, 3))
     (animation,), notes = write(tmp_path / "a.html", moving(figure, shapes=weights))
@@ -263,11 +263,11 @@ def test_an_image_is_written_once_and_sampled_as_each_material_asks(browser, tmp
         {"wrap": ("clamp", "clamp"), "is_smooth": False},
         {"wrap": ("repeat", "clamp")},
     ]
-    textures = [viewer.rig.material.Texture("a.png", image, **look) for look in looks]
+    textures = [viewer.rigs.material.Texture("a.png", image, **look) for look in looks]
     mesh = replace(
         plain.mesh,
         uvs=np.random.default_rng(3).random((90, 2)),
-        materials=tuple(viewer.rig.material.Material(base_texture=each) for each in textures),
+        materials=tuple(viewer.rigs.material.Material(base_texture=each) for each in textures),
         triangle_materials=np.arange(plain.mesh.n_triangles, dtype=np.int32) % len(looks),
     )
     write(tmp_path / "a.html", moving(replace(plain, mesh=mesh)))
@@ -402,7 +402,7 @@ def test_hidden_parts_are_left_out_and_reported(tmp_path, moves):
 )
 def test_surfaces_that_look_different_are_reported(tmp_path, look, said):
     plain = tangle(n_joints=4, n_influences=2)
-    material = viewer.rig.material.Material(**look)
+    material = viewer.rigs.material.Material(**look)
     shown = np.zeros(plain.mesh.n_triangles, dtype=np.int32)
     mesh = replace(plain.mesh, materials=(material,), triangle_materials=shown)
     _, notes = write(tmp_path / "a.html", moving(replace(plain, mesh=mesh)))

@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exporting import export_frames
-from rig import hand_made
+from rigs import hand_made
 
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions
 from viewer.exporters._losses.largest_distances import apart
 from viewer.exporters._losses.posed_bodies import Body, Poses, Side, poses_of
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.clip import Channel, Clip, evaluate
-from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
-from viewer.rig.scene import Actor
-from viewer.rig.skin import skin_from_entries, skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.clip import Channel, Clip, evaluate
+from viewer.rigs.motion.sampled_animation import SampledAnimation, sample_animation
+from viewer.rigs.scene import Actor
+from viewer.rigs.skin import skin_from_entries, skin_from_lists
 
 TOLD = 5e-3  # messages have three digits
 

@@ -18,12 +18,12 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import VrmMeta, export
 from viewer.exporters.vrm.humanoid import human_bones
-from viewer.lint import lint_files
+from viewer.linting import lint_files
 from viewer.loading import load
-from viewer.rig.figure import Figure
-from viewer.rig.humanoid import Humanoid
-from viewer.rig.scene import figure_pose
-from viewer.rig.shape import shaped
+from viewer.rigs.figure import Figure
+from viewer.rigs.humanoid import Humanoid
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.shape import shaped
 
 LICENCE = "https://vrm.dev/licenses/1.0/"
 ME = VrmMeta("", ("Me",), LICENCE)

@@ -14,8 +14,8 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import VrmMeta, export
 from viewer.loading import load
-from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.pose import local_matrices, rest_pose
+from viewer.rigs.kinematics import forward_kinematics
+from viewer.rigs.pose import local_matrices, rest_pose
 
 TURN = np.array([-1.0, 1.0, -1.0])  # 180 degrees about y
 SINGLE = 1e-6  # for lengths below 2

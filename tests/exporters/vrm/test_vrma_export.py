@@ -14,9 +14,9 @@ from viewer.cli import run
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.sampled_animation import single_frame
-from viewer.rig.scene import Actor
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.sampled_animation import single_frame
+from viewer.rigs.scene import Actor
 
 LIMBS = (("leftUpperArm", "leftLowerArm"), ("rightUpperLeg", "rightLowerLeg"), ("hips", "head"))
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)

@@ -22,9 +22,9 @@ from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.formats.anny import ACTIONS
 from viewer.loading import MotionSettings
-from viewer.rig.scene import figure_pose
-from viewer.rig.shape import rest_joints, shaped
-from viewer.rig.skinning import deform
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.shape import rest_joints, shaped
+from viewer.rigs.skinning import deform
 
 EXACT = 1e-12  # metres
 MEAN_MAN = "universal_male_young_averagemuscle_averageweight"

@@ -20,7 +20,7 @@ from viewer.formats._archive.zip import FileWindow, StoredFile
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._source import Source
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 ROWS = np.arange(12.0).reshape(4, 3) / 8
 

@@ -12,7 +12,7 @@ from formats.test_mutations import mutate
 
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, bvh
-from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rigs.motion.evaluation import frames_of, world_frames
 
 
 def refusal(text: str) -> Fault:

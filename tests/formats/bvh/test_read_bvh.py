@@ -9,15 +9,15 @@ from builders import axis_turn
 from formats.bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
-from rig.retargeting.trotting import animal
-from rig.retargeting.two_people import figure_of
+from rigs.retargeting.trotting import animal
+from rigs.retargeting.two_people import figure_of
 
 from viewer.formats import Source, detect
 from viewer.formats.bvh.guess import guess_up
-from viewer.rig.motion.evaluation import frames_of, world_frames
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.motion.evaluation import frames_of, world_frames
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.motion.timing import Timing
 
 
 def about(axis: int, degrees: float) -> np.ndarray:

@@ -11,8 +11,8 @@ from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect, read
 from viewer.formats.easymocap.bodies import hold, last_given
 from viewer.phrases import one_of
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.captures.capture import Capture
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.captures.capture import Capture
 
 BODY = FAMILY[24].names[:22]
 FACE = ("jaw", "left_eye", "right_eye")

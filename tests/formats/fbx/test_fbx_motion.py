@@ -11,11 +11,11 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.formats.fbx.contents import target_weights
-from viewer.rig.captures.carried_view import view_in
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, file_method
+from viewer.rigs.captures.carried_view import view_in
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning, file_method
 
 pytestmark = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
 

@@ -21,7 +21,7 @@ from viewer.formats.gltf.materials import (
     reading_materials,
 )
 from viewer.formats.gltf.textures import DecodedImage, Slot, transform_matrix
-from viewer.rig.material import Material
+from viewer.rigs.material import Material
 
 PIXELS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [9, 8, 7]]], dtype=np.uint8)
 

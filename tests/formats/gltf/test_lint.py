@@ -7,11 +7,11 @@ import pytest
 from formats.gltf.files import File, animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 
-from viewer.lint import lint_files, recheck
+from viewer.linting import lint_files, recheck
 from viewer.loading import MotionSettings, load
-from viewer.rig import skeleton
-from viewer.rig.motion.animation_choice import play_animation
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs import skeleton
+from viewer.rigs.motion.animation_choice import play_animation
+from viewer.rigs.skeleton import Skeleton
 
 Change = Callable[[File], object]
 

@@ -21,9 +21,9 @@ from viewer.rendering.camera_views import drawn_cameras, with_cameras
 from viewer.rendering.framing import framed_poses
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Recording
-from viewer.rig.captures.carried_view import view_in
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.evaluation import pose_actors
+from viewer.rigs.captures.carried_view import view_in
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.motion.evaluation import pose_actors
 
 HALF = math.sqrt(0.5)
 

@@ -11,9 +11,9 @@ from spec_evaluator import Evaluator
 
 from viewer.formats import Source
 from viewer.formats.gltf import read
-from viewer.rig.figure import Figure, FigureGroup
-from viewer.rig.motion.evaluation import frames_of, pose_of
-from viewer.rig.skinning import deform
+from viewer.rigs.figure import Figure, FigureGroup
+from viewer.rigs.motion.evaluation import frames_of, pose_of
+from viewer.rigs.skinning import deform
 
 ROUNDING = 1e-12  # relative to the size, in double precision
 

@@ -2,7 +2,7 @@
 
 from viewer.formats import Source
 from viewer.formats.obj import read
-from viewer.rig.mesh import Mesh
+from viewer.rigs.mesh import Mesh
 
 SQUARE = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n"
 

@@ -12,7 +12,7 @@ from viewer.formats import Source, _polygons, detect, obj
 from viewer.formats._polygons import triangulate
 from viewer.formats._text.growing_table import GrowingTable
 from viewer.media.png import encode_png
-from viewer.rig.mesh import triangle_areas, volume
+from viewer.rigs.mesh import triangle_areas, volume
 
 SQUARE = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n"
 

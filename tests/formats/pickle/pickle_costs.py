@@ -7,7 +7,7 @@ from formats.pickle_bytes import (
 )
 
 from viewer.errors import FormatError
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 
 def self_contained(data: bytes) -> None:

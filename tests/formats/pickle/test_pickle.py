@@ -36,7 +36,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Opaque, Sparse
 from viewer.formats._source import Source
-from viewer.rig.arrays import Deferred, frozen
+from viewer.rigs.arrays import Deferred, frozen
 
 ROWS = np.arange(12.0).reshape(4, 3) / 8
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"

@@ -24,10 +24,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import viewer
 from viewer.errors import RigError
 from viewer.formats import save_image
-from viewer.rig.mesh import split_seams
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.mesh import split_seams
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record
+from viewer.rigs.skinning import deform, joint_matrices
 
 EXACT = 1e-15  # metres; one or two rounding errors of values near 1
 

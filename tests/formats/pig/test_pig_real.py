@@ -6,12 +6,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.errors import FormatError
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import split_seams, volume
-from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
-from viewer.rig.skin import influence_counts, weight_sums
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import split_seams, volume
+from viewer.rigs.pose import joint_rotations, rest_pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record, record_of
+from viewer.rigs.skin import influence_counts, weight_sums
+from viewer.rigs.skinning import deform, joint_matrices
 
 PRINTED = 5.01e-7  # metres; check values have six decimals
 NO_WEIGHTS = [5, 13, 38, 54, 10, 12, 18, 20, 24, 25, 30, 35, 37, 43, 45, 53, 59, 61]

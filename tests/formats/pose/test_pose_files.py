@@ -14,10 +14,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import viewer
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats import Source, pose
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.hands import hand_vectors
-from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.hands import hand_vectors
+from viewer.rigs.pose import joint_rotations, rest_pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record, record_of
 
 
 def read(path):

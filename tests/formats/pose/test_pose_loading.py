@@ -16,9 +16,9 @@ from viewer.formats import pose, save_image
 from viewer.formats._source import Source
 from viewer.loading import read_files
 from viewer.loading.additions import add_to_actor
-from viewer.rig.pose import pose_key
-from viewer.rig.posing.pose_record import PoseRecord
-from viewer.rig.retargeting.pose_transfer import JointRotations
+from viewer.rigs.pose import pose_key
+from viewer.rigs.posing.pose_record import PoseRecord
+from viewer.rigs.retargeting.pose_transfer import JointRotations
 
 SKEL = "balljoint hip { rotxlimit -1 1 balljoint knee { offset 0 -1 0 } }"
 RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)

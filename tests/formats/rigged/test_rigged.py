@@ -13,15 +13,15 @@ from viewer.errors import FormatError, RigError
 from viewer.formats import Source, detect, read
 from viewer.formats.rig import NamedFiles
 from viewer.formats.rigged import figure_arrays, save
-from viewer.rig.annotations import VertexField
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.figure import Figure
-from viewer.rig.hands import Hand
-from viewer.rig.material import Material, Outline, Rim, Texture
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.posing.pose_vector import PoseLayout
-from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.figure import Figure
+from viewer.rigs.hands import Hand
+from viewer.rigs.material import Material, Outline, Rim, Texture
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.posing.pose_vector import PoseLayout
+from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.skin import skin_from_lists
 
 
 def glazed() -> Material:

@@ -9,7 +9,7 @@ from formats.skel_text import GOOD, INF, assert_good, read, refusal, silent
 
 from viewer.errors import FormatError
 from viewer.formats import Source, skel
-from viewer.rig.pose import rest_pose
+from viewer.rigs.pose import rest_pose
 
 
 def unknown(line, word):

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, read
-from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS
-from viewer.rig.motion.instances import pose_arrays, worlds
-from viewer.rig.posing.pose_vector import read_vector
-from viewer.rig.scene import figure_pose
-from viewer.rig.shape import shaped
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.bodies.joint_posing import DOF_NAMES, JOINTS
+from viewer.rigs.motion.instances import pose_arrays, worlds
+from viewer.rigs.posing.pose_vector import read_vector
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.shape import shaped
+from viewer.rigs.skinning import deform, joint_matrices
 
 ROUNDING = 1e-11  # metres
 MODEL = arrays()

@@ -14,10 +14,10 @@ from formats.test_mutations import mutate
 
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
-from viewer.rig.figure import Figure
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.figure import Figure
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record, record_of
+from viewer.rigs.skinning import deform, joint_matrices
 
 pytestmark = pytest.mark.slow
 

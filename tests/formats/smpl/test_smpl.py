@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, smpl
-from viewer.rig.annotations import keypoint_positions
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.mesh import split_seams
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_record import PoseRecord, apply_record
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.annotations import keypoint_positions
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.mesh import split_seams
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_record import PoseRecord, apply_record
+from viewer.rigs.skinning import deform, joint_matrices
 
 SMPL = model("smpl", 32)
 VERTICES, JOINTS = 32, 24

@@ -21,13 +21,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.errors import FormatError
-from viewer.rig.bodies.smpl_family import animal_of
-from viewer.rig.motion.evaluation import rest_translations_of
-from viewer.rig.pose import rest_pose
-from viewer.rig.posing.pose_vector import read_vector
-from viewer.rig.scene import figure_pose
-from viewer.rig.shape import joint_shifts, rest_joints, shaped
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.bodies.smpl_family import animal_of
+from viewer.rigs.motion.evaluation import rest_translations_of
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.posing.pose_vector import read_vector
+from viewer.rigs.scene import figure_pose
+from viewer.rigs.shape import joint_shifts, rest_joints, shaped
+from viewer.rigs.skinning import deform, joint_matrices
 
 SMPL = model("smpl", 32)
 MATRICES = ("kintree_table", "v_template", "f", "weights", "posedirs")

@@ -15,7 +15,7 @@ from viewer.formats._text.json_places import (
     unique,
     value_place,
 )
-from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rigs.retargeting.joint_map import JointMap
 
 TEXT = r'{"a": [1, {"b": "x,]}\"", "c": []}, -2e5], "": {}, "d\u00e9": {"a": null}, "e": true}'
 

@@ -8,7 +8,7 @@ from viewer.formats import Source, obj, ply, write
 from viewer.formats._text.number_text import row_texts
 from viewer.media.saving import save_parts
 from viewer.progress import Cancelled, receiving, report
-from viewer.rig.scene import Actor
+from viewer.rigs.scene import Actor
 
 HEAD = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
 

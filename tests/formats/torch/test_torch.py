@@ -30,7 +30,7 @@ from numpy.testing import assert_array_equal
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 ROWS = np.arange(12, dtype=np.float32).reshape(4, 3) / 8
 DATA = Path(__file__).resolve().parents[2] / "data"

@@ -15,7 +15,7 @@ from viewer.errors import ViewerError
 from viewer.formats import Source, detect
 from viewer.formats._archive.opening import open_archive
 from viewer.formats.video_mocap import read as open_results
-from viewer.rig.captures.capture import Capture
+from viewer.rigs.captures.capture import Capture
 
 pytestmark = pytest.mark.slow
 RESULTS: dict[str, Any] = {

@@ -18,7 +18,7 @@ from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import Options
 from viewer.formats.video_mocap import read as open_results
-from viewer.rig.captures.capture import Capture
+from viewer.rigs.captures.capture import Capture
 
 NAN = np.nan
 

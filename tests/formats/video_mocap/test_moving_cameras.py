@@ -25,7 +25,7 @@ from numpy.testing import assert_allclose
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import read as open_results
-from viewer.rig.captures.cameras import view_at
+from viewer.rigs.captures.cameras import view_at
 
 TRACKS = {0: [0, 1, 2, 3], 3: [2, 4, 5]}
 

@@ -38,7 +38,7 @@ from viewer.formats.video_mocap import read as open_results
 from viewer.formats.video_mocap.tools import TOOLS, module_of
 from viewer.loading import MotionSettings, load
 from viewer.models import save_model_folder
-from viewer.rig.captures.cameras import view_at
+from viewer.rigs.captures.cameras import view_at
 
 ROOT = Path(__file__).resolve().parents[3]
 

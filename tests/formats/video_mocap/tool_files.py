@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.scene import Scene
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import Scene
 
 UPRIGHT = np.array([np.pi, 0.0, 0.0])
 """The rotation vector of a person who is upright in camera space, where y points down."""

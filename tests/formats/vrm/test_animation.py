@@ -15,9 +15,9 @@ from viewer.errors import FormatError
 from viewer.formats.gltf import read
 from viewer.loading import MotionSettings, load
 from viewer.loading.body_models import is_body
-from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.skinning import deform, joint_matrices
+from viewer.rigs.constraints.constraint import Constraint
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.skinning import deform, joint_matrices
 
 BONES = ("hips", "spine", "head", "leftUpperArm", "leftLowerArm", "rightUpperArm")
 PARENTS = (-1, 0, 1, 1, 3, 1)

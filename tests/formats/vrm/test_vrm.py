@@ -11,13 +11,13 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.loading import load
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.figure import Figure
-from viewer.rig.inspection.front import guess_front
-from viewer.rig.pose import rest_pose
-from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.retargeting.retarget import expression_weights
-from viewer.rig.shape import shaped
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import Figure
+from viewer.rigs.inspection.front import guess_front
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.retargeting.retarget import expression_weights
+from viewer.rigs.shape import shaped
 
 BONES = {"hips": 0, "spine": 1, "chest": 2, "head": 3, "leftUpperArm": 4, "rightUpperArm": 5}
 PARENTS = {1: 0, 2: 1, 3: 2, 4: 2, 5: 2}

@@ -37,7 +37,7 @@ from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
-from viewer.rig.scene import scene_box
+from viewer.rigs.scene import scene_box
 
 ROOT = Path(__file__).resolve().parents[3]
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is used only on Linux")

@@ -19,8 +19,8 @@ from viewer.rendering.gpu import upload
 from viewer.rendering.gpu.index_sets import curve_order, curve_places, index_set
 from viewer.rendering.gpu.surfaces import PLAIN
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 _KINDS = ("Buffer", "Texture", "VertexArray", "Framebuffer", "Renderbuffer", "Query")
 _PROGRAMS = ("Program", "Shader")

@@ -15,14 +15,14 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skin import has_influence, skin_from_lists
-from viewer.rig.skinning import Skinning
-from viewer.rig.skinning.lbs import blended_matrices
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skin import has_influence, skin_from_lists
+from viewer.rigs.skinning import Skinning
+from viewer.rigs.skinning.lbs import blended_matrices
 
 POSITION_TOLERANCE = 1e-5  # relative to the figure's size
 NORMAL_TOLERANCE = 1e-5  # relative to a unit normal, multiplied by its shortening in blending

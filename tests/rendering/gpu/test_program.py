@@ -10,7 +10,7 @@ from viewer.errors import RenderError
 from viewer.rendering import shader_text
 from viewer.rendering.gpu.program import SHADING, Programs, set_uniforms
 from viewer.resources import resource
-from viewer.rig.skinning import METHODS
+from viewer.rigs.skinning import METHODS
 
 VARYINGS = ("v_position", "v_normal")
 

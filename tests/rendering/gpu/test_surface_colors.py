@@ -26,9 +26,9 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import upload_surfaces
 from viewer.rendering.gpu.upload import picture_texture
 from viewer.resources import resource
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material
+from viewer.rigs.scene import Actor, Scene
 
 # Textures
 

@@ -20,8 +20,8 @@ from viewer.rendering.overlay.joint_marks import (
 )
 from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.view import view_of
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 SIZE = (800, 720)
 BOX = np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])

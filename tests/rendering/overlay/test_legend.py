@@ -20,13 +20,13 @@ from viewer.rendering.overlay.legend import (
     round_ticks,
 )
 from viewer.rendering.scalar_look import look_of, shown_ends
-from viewer.rig.annotations import BodyParts, VertexField
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.scalars import SCALARS, menu_title, missing_part
-from viewer.rig.scene import Actor, Scene, scene_box, scene_points
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning
+from viewer.rigs.annotations import BodyParts, VertexField
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.scalars import SCALARS, menu_title, missing_part
+from viewer.rigs.scene import Actor, Scene, scene_box, scene_points
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning
 
 
 def strip(influences=None, **parts) -> Figure:

@@ -23,8 +23,8 @@ from viewer.rendering.overlay.segments import (
 )
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor, Scene
 
 SIDE = 80  # pixels; x and y are from -2 to 2, so a unit is 20 pixels
 BOX = np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])

@@ -12,13 +12,13 @@ from viewer.formats._video_images import VideoImages
 from viewer.media.video import VideoSink
 from viewer.rendering.camera import Camera, camera_from_view
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.captures.carried_view import view_in
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.carried_view import view_in
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 EMPTY = Scene([])
 

@@ -10,8 +10,8 @@ from rendering.front_view import alone
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.figure import Figure
-from viewer.rig.scene import scene_box
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import scene_box
 
 SIDE = 96
 STYLES = ("octahedra", "sticks", "axes")

@@ -10,11 +10,11 @@ import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import rest_pose
-from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skin import skin_from_lists
+from viewer.rigs.skinning import Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size, as for linear blending
 NORMAL_TOLERANCE = 5e-5  # 5 times that: five blended quaternions may sum to a fifth of their length

@@ -22,12 +22,12 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.view import View, view_of
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rigs.skinning import METHODS, Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size, as for single actors
 VARYINGS = "v_position", "v_normal"

@@ -23,13 +23,13 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
 from viewer.rendering.view import View, normal_matrix
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.shape import pose_weights
-from viewer.rig.skin import Skin, skin_from_lists
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.shape import pose_weights
+from viewer.rigs.skin import Skin, skin_from_lists
+from viewer.rigs.skinning import METHODS, Skinning
 
 HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 

@@ -11,11 +11,11 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.colors import path_colors
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import motion_path_pass
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 PATH = ((0, 0),)
 

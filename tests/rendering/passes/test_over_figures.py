@@ -14,10 +14,10 @@ from viewer.rendering.overlay.annotation import Annotation, Labels
 from viewer.rendering.overlay.segments import SegmentStyle, dots
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.passes.outline_pass import Outlined
-from viewer.rig.annotations import Keypoints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.annotations import Keypoints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
 

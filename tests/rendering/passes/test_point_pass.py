@@ -7,10 +7,10 @@ from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.passes import point_pass
 from viewer.rendering.passes.point_pass import point_radii
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.figure import Figure
-from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scene import Actor, Scene
 
 RADIUS = 0.2  # radius of the drawn balls, 4 pixels
 

@@ -23,12 +23,12 @@ from viewer.rendering.gpu.target import Target, picture_rows
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.outline_pass import Outlined
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
-from viewer.rig.scene import Actor, Scene, scene_box
-from viewer.rig.skin import skin_from_lists
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.skin import skin_from_lists
 
 GROUND = np.array([[-2.0, -1.5, -2.0], [2.0, 1.5, 2.0]])  # at height -1.5
 

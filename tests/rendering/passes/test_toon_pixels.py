@@ -22,11 +22,11 @@ from rendering.front_view import (
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.expressions import ExpressionRules, MaterialBinds
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Outline, Rim
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.expressions import ExpressionRules, MaterialBinds
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Outline, Rim
+from viewer.rigs.scene import Actor, Scene, scene_box
 
 DARK = (0.0, 0.0, 0.0)
 # The material is in shade for all directions of the light, so that only the rim is visible.

@@ -26,11 +26,11 @@ from viewer.app.retargeting.drive_changes import (
     toggle_hands,
 )
 from viewer.phrases import printable
-from viewer.rig.captures.keypoint_layouts import fitted_body, keypoint_distances
-from viewer.rig.mesh import box_size
-from viewer.rig.motion.spring_motion import has_springs, release_springs, springs_for
-from viewer.rig.scalars import length_unit
-from viewer.rig.scene import Actor
+from viewer.rigs.captures.keypoint_layouts import fitted_body, keypoint_distances
+from viewer.rigs.mesh import box_size
+from viewer.rigs.motion.spring_motion import has_springs, release_springs, springs_for
+from viewer.rigs.scalars import length_unit
+from viewer.rigs.scene import Actor
 
 _PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
 _LONGEST_WINDOW = 1e4  # maximum extent of a motion path, seconds

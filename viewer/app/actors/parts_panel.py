@@ -14,7 +14,7 @@ from viewer.app.core.widgets import (
     visible_rows,
 )
 from viewer.phrases import printable
-from viewer.rig.scene import Actor
+from viewer.rigs.scene import Actor
 
 _LONGEST = 60  # maximum length of a name in characters
 

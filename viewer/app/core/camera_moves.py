@@ -6,10 +6,10 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.rendering.camera import Camera, camera_from_view, fit, follow_view
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.cameras import CameraView
-from viewer.rig.captures.carried_view import view_in
-from viewer.rig.scene import scene_points
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.cameras import CameraView
+from viewer.rigs.captures.carried_view import view_in
+from viewer.rigs.scene import scene_points
 
 _GAP = 6.0  # margin between the tools and the scene, points
 _LEAST = 0.6  # minimum fraction of the view's height to fill, even if overlays cover it

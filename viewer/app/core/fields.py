@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import is_typed_in_place, number_field, unit_of
-from viewer.rig.number_text import number_text
+from viewer.rigs.number_text import number_text
 
 Number = TypeVar("Number", int, float)
 

@@ -12,12 +12,12 @@ from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rendering.framing import frames_looked_at, outermost
 from viewer.rendering.recorder import copied
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box
-from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, Scene, Shown, scene_points
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, Scene, Shown, scene_points
 
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total

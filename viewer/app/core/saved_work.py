@@ -7,10 +7,10 @@ from dataclasses import field, replace
 from functools import partial
 
 from viewer.data_classes import dataclass
-from viewer.rig.figure import Figure
-from viewer.rig.motion.transform_clip import Animation, TransformClip
-from viewer.rig.pose import PoseKey
-from viewer.rig.scene import Actor
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.transform_clip import Animation, TransformClip
+from viewer.rigs.pose import PoseKey
+from viewer.rigs.scene import Actor
 
 
 @dataclass(frozen=True, slots=True, eq=False)

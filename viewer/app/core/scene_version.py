@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.figure import Figure
-from viewer.rig.memo import NumberKey
-from viewer.rig.pose import PoseKey, pose_key
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.scene import Actor, Motion, Scene, Swinging
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import NumberKey
+from viewer.rigs.pose import PoseKey, pose_key
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.scene import Actor, Motion, Scene, Swinging
 
 
 class ActorVersion(NamedTuple):  # a tuple is compared quickly, also for hundreds of actors

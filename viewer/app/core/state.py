@@ -25,10 +25,10 @@ from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Legend
-from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import WantedFront, guess_front
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Actor, Scene, scene_points
+from viewer.rigs.arrays import Floats
+from viewer.rigs.inspection.front import WantedFront, guess_front
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Actor, Scene, scene_points
 
 _FARTHEST = 1e4  # maximum distance of the camera, relative to the scene's size
 Part = TypeVar("Part")

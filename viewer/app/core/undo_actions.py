@@ -7,7 +7,7 @@ from functools import partial
 
 from viewer.app.core.state import AppState
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 _Step = Callable[[Scene, DisplayOptions, Callable[[float], None]], bool]
 """``History.undo`` or ``redo``."""

@@ -10,9 +10,9 @@ from typing import Protocol
 from viewer.app.core.scene_version import ActorVersion, SceneVersion, version_of
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.motion.sampled_clip import with_rate
-from viewer.rig.pose import PoseKey, pose_of
-from viewer.rig.scene import Actor, Motion, Scene
+from viewer.rigs.motion.sampled_clip import with_rate
+from viewer.rigs.pose import PoseKey, pose_of
+from viewer.rigs.scene import Actor, Motion, Scene
 
 _MOST = 500  # maximum number of steps
 _PoseAt = Callable[[float], None]

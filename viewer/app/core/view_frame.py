@@ -7,8 +7,8 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.vectors import unit
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.vectors import unit
 
 Place = tuple[float, float]
 """A position in the window, in window coordinates."""

@@ -16,7 +16,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import WARNING, text_color
 from viewer.data_classes import dataclass
-from viewer.rig.number_text import number_text
+from viewer.rigs.number_text import number_text
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

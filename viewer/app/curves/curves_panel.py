@@ -42,8 +42,8 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.files.files import offer_files
-from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, slopes
-from viewer.rig.motion.transform_clip import INTERPOLATIONS
+from viewer.rigs.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, slopes
+from viewer.rigs.motion.transform_clip import INTERPOLATIONS
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}

@@ -8,17 +8,17 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.captures.points import PointClip
-from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
-from viewer.rig.memo import Memo
-from viewer.rig.motion.clip import Channel, Clip, evaluate_all
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
-from viewer.rig.transform_keys.euler_curves import rows_of
+from viewer.rigs.arrays import Floats
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.captures.points import PointClip
+from viewer.rigs.geometry.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rigs.memo import Memo
+from viewer.rigs.motion.clip import Channel, Clip, evaluate_all
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
+from viewer.rigs.transform_keys.euler_curves import rows_of
 
 _AXES = "xyz"
 _PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}

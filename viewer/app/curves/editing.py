@@ -19,9 +19,9 @@ from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files
 from viewer.data_classes import dataclass
 from viewer.formats import FORMATS, file_stem, write
-from viewer.rig.arrays import Floats
-from viewer.rig.motion.clip import Channel, Clip, Extrapolation, Tangent, slopes
-from viewer.rig.motion.clip_edit import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.motion.clip import Channel, Clip, Extrapolation, Tangent, slopes
+from viewer.rigs.motion.clip_edit import (
     add_key,
     clip_from_pose,
     delete_keys,
@@ -33,11 +33,11 @@ from viewer.rig.motion.clip_edit import (
     set_tangent,
     with_channel,
 )
-from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor, Motion
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.transform_keys.edit import (
+from viewer.rigs.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Actor, Motion
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.transform_keys.edit import (
     add_transform_key,
     delete_transform_keys,
     joint_values,
@@ -47,7 +47,7 @@ from viewer.rig.transform_keys.edit import (
     set_transform_key,
     set_transform_slope,
 )
-from viewer.rig.transform_keys.euler_curves import TransformRow, key_values, row_values, rows_of
+from viewer.rigs.transform_keys.euler_curves import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds
 KeyPlace = tuple[int, int]

@@ -29,10 +29,10 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.memo import Memo
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Motion
+from viewer.rigs.arrays import Floats
+from viewer.rigs.memo import Memo
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Motion
 
 _TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), 0.55
 _OUTSIDE = (0.0, 0.0, 0.0, 0.2)

@@ -33,13 +33,13 @@ from viewer.loading.capturing import Builder
 from viewer.phrases import printable
 from viewer.progress import Cancelled, part_of_work, silent
 from viewer.rendering.gpu.index_sets import prepare_scene
-from viewer.rig.captures.capture import CapturePart
-from viewer.rig.geometry.vectors import StatedUp
-from viewer.rig.motion.sampled_clip import SampledClip, with_rate
-from viewer.rig.motion.timing import DEFAULT_RATE
-from viewer.rig.pose import pose_key
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.captures.capture import CapturePart
+from viewer.rigs.geometry.vectors import StatedUp
+from viewer.rigs.motion.sampled_clip import SampledClip, with_rate
+from viewer.rigs.motion.timing import DEFAULT_RATE
+from viewer.rigs.pose import pose_key
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.scene import Actor, Scene
 
 _Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}

@@ -14,7 +14,7 @@ from viewer.errors import ViewerError
 from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
 from viewer.progress import report
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 
 @shows_errors

@@ -29,7 +29,7 @@ from viewer.app.layout import show_panel
 from viewer.app.playback.animations import choose_animation
 from viewer.app.view.picks import take_pick
 from viewer.data_classes import dataclass
-from viewer.lint import (
+from viewer.linting import (
     SEVERITIES,
     Finding,
     LintOptions,
@@ -39,14 +39,14 @@ from viewer.lint import (
     summary,
     worst_first,
 )
-from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
+from viewer.linting.captures import LOW_FRACTION, LOW_FRAMES
 from viewer.phrases import counted, printable
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rendering.picking import Pick
 from viewer.rendering.recorder import copied
-from viewer.rig.mesh import box_size
-from viewer.rig.pose import PoseKey
-from viewer.rig.scene import Scene, scene_unit
+from viewer.rigs.mesh import box_size
+from viewer.rigs.pose import PoseKey
+from viewer.rigs.scene import Scene, scene_unit
 
 _COLORS = {
     "error": (1.0, 0.42, 0.36, 1.0),

@@ -10,12 +10,12 @@ from viewer.app.core.camera_moves import fit_points
 from viewer.app.core.state import AppState
 from viewer.app.linting.lint_panel import Linting
 from viewer.errors import ViewerError
-from viewer.lint import Places, places_of, points_of
+from viewer.linting import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.overlay.annotation import Marks
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import actor_points
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import actor_points
 
 _MOST = 3000  # maximum number of marked vertices, and of marked triangle edges
 _FEW = 200  # up to this number, triangles also have a central mark: tiny edges cover no pixel

@@ -5,15 +5,15 @@ from __future__ import annotations
 from viewer.app.core.saved_work import Animations
 from viewer.app.core.state import AppState, shows_errors
 from viewer.phrases import printable
-from viewer.rig.motion.animation_choice import (
+from viewer.rigs.motion.animation_choice import (
     animation_labels,
     counterpart,
     own_first,
     play_animation,
 )
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Actor
 
 NOT_ONE = -2
 """Index of a motion that is not one of the figure's animations."""

@@ -26,10 +26,10 @@ from viewer.app.core.widgets import (
 from viewer.app.files.files import Files, offer_files
 from viewer.app.playback.animations import animation_texts, choose_animation, played
 from viewer.app.playback.tracks import draw_tracks
-from viewer.rig.memo import Memo
-from viewer.rig.motion.sampled_clip import with_rate
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor, Motion
+from viewer.rigs.memo import Memo
+from viewer.rigs.motion.sampled_clip import with_rate
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Actor, Motion
 
 _WIDEST_LIST = 16.0  # maximum width of the list of animations, in font sizes
 _CLAMP = imgui.SliderFlags_.always_clamp

@@ -13,12 +13,12 @@ from viewer.app.core.state import AppState
 from viewer.app.core.theme import faint
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
-from viewer.rig.memo import Memo
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.scene import Actor, Motion
-from viewer.rig.srgb import encode_color
+from viewer.rigs.arrays import Floats
+from viewer.rigs.memo import Memo
+from viewer.rigs.motion.clip import Clip
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor, Motion
+from viewer.rigs.srgb import encode_color
 
 _NAME_WIDTH = 9.0  # width of the actors' names, in font sizes
 _TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler

@@ -44,13 +44,13 @@ from viewer.app.posing.rotate_tool import (
 )
 from viewer.app.posing.toolbar import cancel_drag, no_tool, selected
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.pose import Pose
-from viewer.rig.posing.inverse_kinematics import rotation_axes
-from viewer.rig.posing.joint_rotation import rotation_dofs
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.pose import Pose
+from viewer.rigs.posing.inverse_kinematics import rotation_axes
+from viewer.rigs.posing.joint_rotation import rotation_dofs
+from viewer.rigs.skeleton import joint_label
 
 _DOT_REACH = 14.0
 """Radius around a joint in which a click selects it, points."""

@@ -12,13 +12,13 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
 from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
-from viewer.rig.hands import Hand, hand_coefficients, hand_vectors
-from viewer.rig.memo import Memo
-from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rigs.hands import Hand, hand_coefficients, hand_vectors
+from viewer.rigs.memo import Memo
+from viewer.rigs.pose import Pose, joint_rotations
+from viewer.rigs.posing.pose_vector import set_joint_rotations
 
 _REACH = 3.0  # range of a slider; larger values can be typed
 _CLAMP = imgui.SliderFlags_.always_clamp

@@ -13,21 +13,21 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import is_reset, note_item, plain_zero, show_tooltip
 from viewer.app.posing.posing import HeldVector, Posing, pause_for_edit
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import box_size
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.number_text import number_text
-from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.posing.pose_vector import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import box_size
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.number_text import number_text
+from viewer.rigs.pose import Pose, joint_rotations
+from viewer.rigs.posing.pose_vector import (
     PoseLayout,
     own_numbers,
     rotation_rows,
     set_joint_rotations,
 )
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.skeleton import Skeleton
 
 _DRAGS = "drag, or Ctrl+click to type a value; double-click to reset"
 _LABEL_WIDTH = 4.2  # width of a label, in font sizes

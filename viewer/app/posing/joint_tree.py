@@ -6,8 +6,8 @@ from dataclasses import field
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
-from viewer.rig.hierarchy import path_to_root
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.skeleton import joint_label
 
 _MOST_OPENED = 128  # rigs with more joints are initially collapsed
 

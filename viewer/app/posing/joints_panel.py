@@ -48,15 +48,15 @@ from viewer.app.posing.posing import (
     reset_pose,
 )
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import box_size
-from viewer.rig.number_text import angle_text, number_text
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.hierarchy import depth_first
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import box_size
+from viewer.rigs.number_text import angle_text, number_text
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import (
     DOF_KINDS,
     FIRST_ROTATION,
     Skeleton,

@@ -13,11 +13,11 @@ from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.number_text import number_text
-from viewer.rig.pose import Pose
-from viewer.rig.posing.inverse_kinematics import Reaching, chain_above
-from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.number_text import number_text
+from viewer.rigs.pose import Pose
+from viewer.rigs.posing.inverse_kinematics import Reaching, chain_above
+from viewer.rigs.skeleton import Skeleton, joint_label
 
 LENGTH = 72.0
 """Length of the arrows, points."""

@@ -7,14 +7,14 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import nearest_rotations
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped_skeleton
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import shaped_skeleton
+from viewer.rigs.skeleton import Skeleton
 
 Orientation: TypeAlias = Literal["local", "parent", "world"]
 """Whose axes the rings and arrows of a joint have."""

@@ -21,14 +21,14 @@ from viewer.errors import ViewerError
 from viewer.exporters import ExportOptions, Part, Selection, export, files_written
 from viewer.exporters.pose import export as export_pose
 from viewer.formats import FORMATS, Source, file_stem
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.motion.upright import upright_actor
-from viewer.rig.pose import Pose, pose_key
-from viewer.rig.posing.pose_record import record_of
-from viewer.rig.posing.pose_vector import write_vector
-from viewer.rig.retargeting.mirror import mirror_pose
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.upright import upright_actor
+from viewer.rigs.pose import Pose, pose_key
+from viewer.rigs.posing.pose_record import record_of
+from viewer.rigs.posing.pose_vector import write_vector
+from viewer.rigs.retargeting.mirror import mirror_pose
+from viewer.rigs.scene import Actor, figure_pose
 
 PoseTool: TypeAlias = Literal["select", "rotate", "move"]
 TOOLS: dict[PoseTool, tuple[str, str, str]] = {

@@ -15,14 +15,14 @@ from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.number_text import angle_text
-from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.posing.inverse_kinematics import rotation_axes
-from viewer.rig.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
-from viewer.rig.skeleton import Skeleton, dof_label, joint_label
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.number_text import angle_text
+from viewer.rigs.pose import Pose, joint_rotations
+from viewer.rigs.posing.inverse_kinematics import rotation_axes
+from viewer.rigs.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
+from viewer.rigs.skeleton import Skeleton, dof_label, joint_label
 
 RADIUS = 78.0
 """Radius of the rings, points."""

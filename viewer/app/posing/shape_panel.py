@@ -24,14 +24,14 @@ from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing, pause_for_edit, random_shape, reset_shape
 from viewer.errors import ViewerError
 from viewer.phrases import counted, printable
-from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.figure import Figure
-from viewer.rig.inspection.measure import measure
-from viewer.rig.memo import Memo
-from viewer.rig.morph_target import MORPH_GROUP
-from viewer.rig.pose import Pose
-from viewer.rig.shape import shaped
+from viewer.rigs.arrays import Floats
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import Figure
+from viewer.rigs.inspection.measure import measure
+from viewer.rigs.memo import Memo
+from viewer.rigs.morph_target import MORPH_GROUP
+from viewer.rigs.pose import Pose
+from viewer.rigs.shape import shaped
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
 _SEARCHED = 60  # lists with more shapes have a filter

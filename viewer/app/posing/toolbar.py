@@ -29,8 +29,8 @@ from viewer.app.posing.posing import (
     mirror,
     paste_pose,
 )
-from viewer.rig.posing.joint_rotation import rotates_freely, rotation_dofs
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.posing.joint_rotation import rotates_freely, rotation_dofs
+from viewer.rigs.skeleton import joint_label
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools

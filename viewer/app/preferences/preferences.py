@@ -17,7 +17,7 @@ from viewer.rendering.options import QUALITIES, Quality
 
 if TYPE_CHECKING:
     from viewer.app.core.theme import Theme
-    from viewer.rig.geometry.vectors import StatedUp
+    from viewer.rigs.geometry.vectors import StatedUp
 
 CAPTURED = "captured"
 """Value of ``Appearance.captured`` in the frame in which the key was pressed."""

@@ -39,7 +39,7 @@ from viewer.app.weights.weights_panel import Weights
 from viewer.data_classes import dataclass, setting
 from viewer.errors import OutputError, ViewerError
 from viewer.formats import check_targets, file_stem
-from viewer.lint import Finding, places_of
+from viewer.linting import Finding, places_of
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
 from viewer.phrases import counted, printable
 from viewer.rendering.framing import frames_looked_at
@@ -50,11 +50,11 @@ from viewer.rendering.overlay.annotation import Annotation, mark_annotation
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer
-from viewer.rig.arrays import Floats
-from viewer.rig.inspection.explanation import explain as explain_vertex
-from viewer.rig.motion.timing import frame_at, frame_times
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.inspection.explanation import explain as explain_vertex
+from viewer.rigs.motion.timing import frame_at, frame_times
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Scene
 
 _SIZES = {
     "view": "size of the view",

@@ -13,10 +13,10 @@ from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.progress import part_of_work
-from viewer.rig.motion.sampled_clip import SampledClip, with_rate
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.scene import Actor
+from viewer.rigs.motion.sampled_clip import SampledClip, with_rate
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.scene import Actor
 
 NOT_DRIVEN = "too few joints match, so the motion does not move this figure: choose its joints"
 """What to do if a motion does not move a figure yet."""

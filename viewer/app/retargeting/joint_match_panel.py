@@ -32,12 +32,12 @@ from viewer.errors import ViewerError
 from viewer.formats import Source, file_stem
 from viewer.formats._joint_map import read_joint_map, write_joint_map
 from viewer.phrases import counted, printable
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import aligned_rests, front_axes, full_map, matches_of
-from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.skeleton import joint_label, joint_labels, shown_joints
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.retargeting.drive import Drive
+from viewer.rigs.retargeting.driven_clip import aligned_rests, front_axes, full_map, matches_of
+from viewer.rigs.retargeting.joint_map import JointMap
+from viewer.rigs.skeleton import joint_label, joint_labels, shown_joints
 
 _ORIGINS = {
     "map": ("edited", "chosen by hand or in a joint map"),

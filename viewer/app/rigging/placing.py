@@ -13,14 +13,14 @@ from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.diagnostics import Diagnostic
 from viewer.rendering.camera import camera_axes
 from viewer.rendering.passes.ghost_pass import Ghost, GhostStyle
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import nearest_rotations
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.pose import placement_matrix, pose_key
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.pose import placement_matrix, pose_key
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import deform
 
 # Messages about the fit of the template, which remain valid when it is moved.
 _DONE = ("R003.pose", "R003.not-fitted")

@@ -31,16 +31,16 @@ from viewer.autorig.rigged import clip_for
 from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
 from viewer.phrases import printable
-from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Ints
-from viewer.rig.comparison.pairs import Pairs, row_distances
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.sampled_animation import baked
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
-from viewer.rig.skin import Skin, owners
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.arrays import Ints
+from viewer.rigs.comparison.pairs import Pairs, row_distances
+from viewer.rigs.hierarchy import depth_first
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_animation import baked
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
+from viewer.rigs.skin import Skin, owners
 
 MATCH_COLORS = {
     "class:match": "matched or not",

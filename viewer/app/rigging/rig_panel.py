@@ -71,11 +71,11 @@ from viewer.errors import ViewerError
 from viewer.formats import MESHES
 from viewer.loading.placing import placed_like
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.mesh import bounding_box
-from viewer.rig.scene import Actor, actor_points, free_title
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_euler
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.scene import Actor, actor_points, free_title
 
 _MOST_ITERATIONS, _MOST_INFLUENCES = 50, 16
 _ONLY: dict[str, tuple[TransferMethod, ...]] = {

@@ -31,15 +31,15 @@ from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.phrases import one_of, printable
 from viewer.rendering.passes.ghost_pass import Ghost, GhostStyle
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.ray_hit import RayHit
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import Pose, pose_key
-from viewer.rig.scene import Actor, Motion, Scene
-from viewer.rig.skin import Skin
-from viewer.rig.skinning import posed_mesh
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.ray_hit import RayHit
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import Pose, pose_key
+from viewer.rigs.scene import Actor, Motion, Scene
+from viewer.rigs.skin import Skin
+from viewer.rigs.skinning import posed_mesh
 
 RigTool: TypeAlias = Literal["", "move", "rotate", "scale", "landmarks"]
 TOOLS: dict[RigTool, tuple[str, str]] = {

@@ -43,10 +43,10 @@ from viewer.app.rigging.rigging import (
 from viewer.app.rigging.work import finish_work, start_align, start_reading
 from viewer.app.view.hovering import Picking
 from viewer.rendering.passes.ghost_pass import Ghost
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.ray_hit import RayHit, first_hit, surface_point
-from viewer.rig.geometry.transform import apply_transform, translation_matrix
-from viewer.rig.mesh import Mesh, bounding_box
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.ray_hit import RayHit, first_hit, surface_point
+from viewer.rigs.geometry.transform import apply_transform, translation_matrix
+from viewer.rigs.mesh import Mesh, bounding_box
 
 _TEMPLATE_INK, _TARGET_INK = (0.35, 0.70, 1.0, 1.0), (1.0, 0.75, 0.30, 1.0)
 _RIM = (0.0, 0.0, 0.0, 0.8)

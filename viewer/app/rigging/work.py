@@ -48,14 +48,14 @@ from viewer.loading import load
 from viewer.loading.placing import placed_like
 from viewer.phrases import printable
 from viewer.progress import part_of_work, report
-from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.ray_hit import surface_point
-from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.pose import pose_key
-from viewer.rig.scene import Actor, free_title
-from viewer.rig.shape import shaped
-from viewer.rig.skinning import deform
+from viewer.rigs.annotations import VertexField
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.ray_hit import surface_point
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.pose import pose_key
+from viewer.rigs.scene import Actor, free_title
+from viewer.rigs.shape import shaped
+from viewer.rigs.skinning import deform
 
 _Finish = Callable[[AppState], None]
 _CALLED: dict[TransferMethod, str] = {

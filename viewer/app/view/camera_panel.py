@@ -22,10 +22,10 @@ from viewer.app.view.flight import fly_from
 from viewer.phrases import printable
 from viewer.rendering.camera import VIEWS, NamedView, front_azimuth, look_from
 from viewer.rendering.camera_views import image_notes, lens_notes
-from viewer.rig.arrays import Floats
-from viewer.rig.inspection.front import WantedFront, front_axes
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import actor_points
+from viewer.rigs.arrays import Floats
+from viewer.rigs.inspection.front import WantedFront, front_axes
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import actor_points
 
 _CLAMP = imgui.SliderFlags_.always_clamp
 _LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format

@@ -52,8 +52,8 @@ from viewer.rendering.options import (
     skeleton_opacity,
 )
 from viewer.rendering.passes.ground_pass import grid_step
-from viewer.rig.annotations import BodyParts
-from viewer.rig.scene import Shown, scene_unit
+from viewer.rigs.annotations import BodyParts
+from viewer.rigs.scene import Shown, scene_unit
 
 _BACKGROUNDS = {
     "gradient": "Gradient",

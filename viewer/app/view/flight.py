@@ -8,7 +8,7 @@ from viewer.app.core.camera_moves import fit_again
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 _SECONDS = 0.2
 

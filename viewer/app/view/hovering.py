@@ -13,7 +13,7 @@ from viewer.app.weights.weights_panel import Weights, wants_vertex
 from viewer.data_classes import dataclass
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.visibility import has_joint_marks, shows_skeleton
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.skeleton import joint_label
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked
 _MOST = 16  # maximum number of actors for picking, which is slow on software drivers

@@ -8,7 +8,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, draw_setting, note_item, same_line_if_room
 from viewer.app.view.display_panel import reset_lights
 from viewer.rendering.options import Color, Light
-from viewer.rig.srgb import decode_color, encode_color
+from viewer.rigs.srgb import decode_color, encode_color
 
 _OF_LIGHT = {"strength": "Strength", "azimuth": "Azimuth", "inclination": "Elevation"}
 """Settings of each light, with their labels."""

@@ -13,7 +13,7 @@ from viewer.rendering.gpu.target import Target
 from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.visibility import shows_skeleton
-from viewer.rig.geometry.transform import apply_transform
+from viewer.rigs.geometry.transform import apply_transform
 
 
 @dataclass(slots=True)

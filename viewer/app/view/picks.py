@@ -20,16 +20,16 @@ from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
 from viewer.rendering.renderer import Renderer
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.inspection.single_vertices import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.inspection.single_vertices import (
     deform_vertices,
     facts_text,
     nearest_corner,
     vertex_facts,
 )
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import joint_label
 
 _LONGEST = 40  # maximum length of a name in characters
 _REST = 0.2  # seconds without mouse movement before a vertex is described

@@ -15,8 +15,8 @@ from viewer.app.core.widgets import (
     slider,
 )
 from viewer.app.files.files import offer_files
-from viewer.rig.scalars import strongest
-from viewer.rig.skinning import METHODS
+from viewer.rigs.scalars import strongest
+from viewer.rigs.skinning import METHODS
 
 _CLAMP = imgui.SliderFlags_.always_clamp
 _ENGINE = 4  # influences per vertex in most game engines

@@ -6,11 +6,11 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.phrases import printable
-from viewer.rig.figure import Figure
-from viewer.rig.memo import Memo
-from viewer.rig.scene import Scene
-from viewer.rig.skeleton import shown_joints
-from viewer.rig.skin import influence_counts
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import Memo
+from viewer.rigs.scene import Scene
+from viewer.rigs.skeleton import shown_joints
+from viewer.rigs.skin import influence_counts
 
 _LONGEST = 400  # maximum length of a text in characters
 _known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()

@@ -33,14 +33,14 @@ from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
 from viewer.rendering.projection import picture_scale, project
 from viewer.rendering.view import view_of
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.inspection.explanation import DualTerms, Explanation, explanation_text
-from viewer.rig.memo import Memo
-from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skinning import METHODS
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.inspection.explanation import DualTerms, Explanation, explanation_text
+from viewer.rigs.memo import Memo
+from viewer.rigs.number_text import number_text
+from viewer.rigs.scene import Actor
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skinning import METHODS
 
 _DIGITS = 4
 _COPIED_DIGITS = 6

@@ -31,13 +31,13 @@ from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.scalar_look import TYPICAL
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.inspection.explanation import Explanation
-from viewer.rig.inspection.explanation import explain as explain_vertex
-from viewer.rig.number_text import short_number
-from viewer.rig.pose import pose_key
-from viewer.rig.scalars import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.inspection.explanation import Explanation
+from viewer.rigs.inspection.explanation import explain as explain_vertex
+from viewer.rigs.number_text import short_number
+from viewer.rigs.pose import pose_key
+from viewer.rigs.scalars import (
     SCALARS,
     informative_quantity,
     joint_influences,

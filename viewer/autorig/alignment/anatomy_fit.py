@@ -33,15 +33,15 @@ from viewer.autorig.anatomy import (
 )
 from viewer.data_classes import dataclass
 from viewer.progress import report_fraction
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.inspection.front import clear_front
-from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import Mesh
-from viewer.rig.pose import Pose, placement_matrix
-from viewer.rig.scene import Actor, Scene
-from viewer.rig.skin import owners, skin_from_entries, weight_sums
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.inspection.front import clear_front
+from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skin import owners, skin_from_entries, weight_sums
+from viewer.rigs.skinning import deform
 
 _AROUND = 1.3  # vertices around a point, up to this multiple of the distance from the surface
 _FEWEST = 8  # minimum number of vertices whose weights a point gets

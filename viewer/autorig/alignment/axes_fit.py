@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.autorig.alignment.icp import FEWEST, HOLD, SETTLED, Pairs, Side, pairs_between
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 
 
 def fit_axes(

@@ -12,7 +12,7 @@ from viewer.autorig.surface.samples import SurfaceSamples
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import report_fraction
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Allowed values of an up axis or a facing."""

@@ -37,22 +37,22 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
 from viewer.progress import report_fraction
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import (
     matrix_to_euler,
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import skinning_matrices, world_matrices, world_rotations
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, placement_matrix
-from viewer.rig.posing.pose_vector import rotation_rows
-from viewer.rig.skeleton import Skeleton, clamp_dofs
-from viewer.rig.skinning.lbs import move
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.kinematics import skinning_matrices, world_matrices, world_rotations
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.pose import Pose, dof_rotations, joint_rotations, placement_matrix
+from viewer.rigs.posing.pose_vector import rotation_rows
+from viewer.rigs.skeleton import Skeleton, clamp_dofs
+from viewer.rigs.skinning.lbs import move
 
 _ROUNDS = 32  # number of iterations
 _MARK_ROUNDS = 24  # number of iterations of a fit to marks only

@@ -36,14 +36,14 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.phrases import Remedy
 from viewer.progress import part_of_work
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import Mesh, volume
-from viewer.rig.pose import Pose
-from viewer.rig.skeleton import joint_label
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import Mesh, volume
+from viewer.rigs.pose import Pose
+from viewer.rigs.skeleton import joint_label
+from viewer.rigs.skinning import deform
 
 _CLOSE = 0.002  # ratio of misfit to size up to which joints are not rotated
 # Fraction of the misfit that rotated joints may leave to be accepted: clothes fit a little better

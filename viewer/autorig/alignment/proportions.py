@@ -14,13 +14,13 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import vertex_normals
-from viewer.rig.retargeting.mirror import joint_partners
-from viewer.rig.skin import Skin, owners, weight_sums
-from viewer.rig.skinning.lbs import move
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.mesh import vertex_normals
+from viewer.rigs.retargeting.mirror import joint_partners
+from viewer.rigs.skin import Skin, owners, weight_sums
+from viewer.rigs.skinning.lbs import move
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, freeze_fields
+from viewer.rigs.arrays import Floats, freeze_fields
 
 # Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.

@@ -26,8 +26,8 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Floats, Ints, freeze_fields
-from viewer.rig.geometry.vectors import Up
+from viewer.rigs.arrays import Floats, Ints, freeze_fields
+from viewer.rigs.geometry.vectors import Up
 
 AlignedBy: TypeAlias = Literal["in place", "search", "landmarks", "given", "fit"]
 TemplateScale: TypeAlias = Literal["uniform", "axes", "none"]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.autorig.surface.welding import Welded, edges
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.topology import edges_of
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.topology import edges_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

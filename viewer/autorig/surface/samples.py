@@ -6,9 +6,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, freeze_fields
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import area_vectors, triangle_areas
+from viewer.rigs.arrays import Floats, Ints, freeze_fields
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.mesh import area_vectors, triangle_areas
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.topology import Indices, components, welded
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.geometry.topology import Indices, components, welded
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
 # less.

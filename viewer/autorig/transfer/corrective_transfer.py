@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.autorig.surface.welding import edges, weld
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.blendshapes import Correctives
-from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.geometry.closest_point import SurfacePoints, interpolate
 
 MOST_NUMBERS = 120_000_000
 """Maximum size of all transferred correctives, 1 GB: larger ones are dropped."""

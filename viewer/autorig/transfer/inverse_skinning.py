@@ -8,10 +8,10 @@ import numpy as np
 
 from viewer.autorig.surface.welding import edges, weld
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.rotation import nearest_rotations
-from viewer.rig.skin import Skin
-from viewer.rig.skinning.lbs import blended_matrices
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.skin import Skin
+from viewer.rigs.skinning.lbs import blended_matrices
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array, csr_array

@@ -6,10 +6,10 @@ import numpy as np
 
 from viewer.autorig.surface.samples import triangle_normals
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.blendshapes import JointRegressor
-from viewer.rig.geometry.closest_point import Surface
-from viewer.rig.skin import Skin, owners
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.blendshapes import JointRegressor
+from viewer.rigs.geometry.closest_point import Surface
+from viewer.rigs.skin import Skin, owners
 
 _ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
 _SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees

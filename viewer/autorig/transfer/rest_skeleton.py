@@ -10,15 +10,19 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_euler, matrix_to_quaternion, quaternion_to_matrix
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, rest_pose, zero_pose
-from viewer.rig.posing.pose_vector import rotation_rows
-from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import (
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+)
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import Pose, dof_rotations, joint_rotations, rest_pose, zero_pose
+from viewer.rigs.posing.pose_vector import rotation_rows
+from viewer.rigs.retargeting.mirror import joint_partners, mirror_axis
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 # Maximum distance of feet from the lowest joint, as a fraction of the joints' vertical extent.
 _LOW = 0.1

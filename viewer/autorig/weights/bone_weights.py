@@ -20,10 +20,10 @@ from viewer.autorig.weights.weight_transfer import conjugate_gradients, factoris
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report, report_fraction
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.retargeting.joint_names import name_tokens
-from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.retargeting.joint_names import name_tokens
+from viewer.rigs.skeleton import Skeleton, shown_joints, shown_parents
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

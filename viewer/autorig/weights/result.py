@@ -10,9 +10,9 @@ from viewer.autorig.correspondence import Matches
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import agree, counted
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.closest_point import SurfacePoints
-from viewer.rig.skin import Skin
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.closest_point import SurfacePoints
+from viewer.rigs.skin import Skin
 
 _LISTED = 5  # maximum number of islands that are listed individually
 _FEW = 0.75  # fraction of matched vertices below which too many weights are estimates

@@ -35,10 +35,10 @@ from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.skin import Skin, limit_influences, skin_rows
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.closest_point import SurfacePoints, interpolate
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.skin import Skin, limit_influences, skin_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -39,7 +39,7 @@ from viewer.errors import ViewerError
 from viewer.media.unfinished import new_prefix
 from viewer.models import named_files, use_model_folder
 from viewer.phrases import listed, printable
-from viewer.rig.bodies.smpl_family import GENDERS
+from viewer.rigs.bodies.smpl_family import GENDERS
 from viewer.version import VERSION
 
 _NOT_RESULTS = ("files", "output", "force", "model_path", "json")

@@ -20,12 +20,12 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.exporters._losses.posed_bodies import Rows, Side, body_rows, vertices
 from viewer.phrases import Shown, brief, optional
 from viewer.progress import report
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
-from viewer.rig.scalars import length_text
-from viewer.rig.skeleton import joint_label
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.motion.evaluation import Frames, frames_between, world_frames
+from viewer.rigs.scalars import length_text
+from viewer.rigs.skeleton import joint_label
 
 _BLOCK = 512  # poses per block
 _SKINNED = 16  # poses per block of all vertices: 38 MB of positions for 100,000 vertices

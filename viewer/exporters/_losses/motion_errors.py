@@ -36,15 +36,15 @@ from viewer.exporters._losses.posed_bodies import (
     linear_as_opened,
 )
 from viewer.phrases import Shown, counted, optional
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import SHORTEST, Channel, Clip
-from viewer.rig.motion.evaluation import Frames, frames_between, frames_of
-from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.clip import SHORTEST, Channel, Clip
+from viewer.rigs.motion.evaluation import Frames, frames_between, frames_of
+from viewer.rigs.motion.sampled_animation import SampledAnimation, frames_at
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.skinning import Skinning
 
 
 def shape_changes(frames: Frames) -> bool:

@@ -17,12 +17,12 @@ from viewer.exporters._losses.largest_distances import (
 )
 from viewer.formats import Source, read
 from viewer.phrases import agree, counted, optional
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import still_frames
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.evaluation import still_frames
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning, deform, joint_matrices
 
 
 def requested_causes(figure: Figure, how: Skinning) -> list[Phrase]:

@@ -16,20 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.geometry.transform import affine_matrices
-from viewer.rig.motion.evaluation import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.transform import affine_matrices
+from viewer.rigs.motion.evaluation import (
     Frames,
     frames_between,
     pose_of,
     world_frames,
 )
-from viewer.rig.shape import joint_shifts
-from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
-from viewer.rig.skinning import Skinning, deform, skin_used
-from viewer.rig.skinning.lbs import move
+from viewer.rigs.shape import joint_shifts
+from viewer.rigs.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
+from viewer.rigs.skinning import Skinning, deform, skin_used
+from viewer.rigs.skinning.lbs import move
 
 Rows = NDArray[np.intp]
 

@@ -24,17 +24,17 @@ from viewer.formats import all_or_none, save_parts
 from viewer.formats.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import up_rotation
-from viewer.rig.geometry.vectors import axis_vector
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.shape import shaped
-from viewer.rig.skeleton import joint_label
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import up_rotation
+from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.hierarchy import depth_first
+from viewer.rigs.motion.evaluation import Frames, frames_between, rest_translations_of
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.shape import shaped
+from viewer.rigs.skeleton import joint_label
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.exporters._options import RotationOrder
-from viewer.rig.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats
 
 _WHOLE = 2.0 * np.pi  # radians in a revolution
 _BLOCK = 256  # frames

@@ -19,14 +19,14 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.exporters._options import RotationOrder
 from viewer.exporters.bvh.angles import euler_angles
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.hierarchy import roots_of
-from viewer.rig.kinematics import joint_worlds, world_matrices
-from viewer.rig.motion.evaluation import Frames, rest_translations_of, world_frames
-from viewer.rig.pose import zero_pose
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.hierarchy import roots_of
+from viewer.rigs.kinematics import joint_worlds, world_matrices
+from viewer.rigs.motion.evaluation import Frames, rest_translations_of, world_frames
+from viewer.rigs.pose import zero_pose
+from viewer.rigs.skeleton import Skeleton
 
 BLOCK = 128  # frames per block, whose matrices fit into the processor's cache
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored

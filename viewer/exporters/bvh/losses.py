@@ -36,20 +36,20 @@ from viewer.formats.bvh.motion import (
     offsets_of,
     read_head,
 )
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import affine_matrices
-from viewer.rig.motion.evaluation import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import affine_matrices
+from viewer.rigs.motion.evaluation import (
     Frames,
     frames_between,
     frames_of,
     rest_translations_of,
     world_frames,
 )
-from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.shape import joint_shifts
-from viewer.rig.skinning import Skinning
+from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.shape import joint_shifts
+from viewer.rigs.skinning import Skinning
 
 Rows = NDArray[np.intp]
 

@@ -39,20 +39,20 @@ from viewer.exporters.gltf.sampled import (
 )
 from viewer.formats import all_or_none, save_bytes
 from viewer.phrases import agree, all_of, counted, file_size, listed, optional, rounded
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.cameras import CameraPath, CameraView
-from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
-from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
-from viewer.rig.geometry.transform import mean_scale
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, Scene, scene_unit
-from viewer.rig.skinning import Skinning
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.cameras import CameraPath, CameraView
+from viewer.rigs.captures.carried_view import carrier_of, moving_alone, played_with, view_in
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rigs.geometry.transform import mean_scale
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.scalars import length_text
+from viewer.rigs.scene import Actor, Scene, scene_unit
+from viewer.rigs.skinning import Skinning
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _Extend = Callable[[Document, Body, Built], list[Diagnostic]]
 # Cameras

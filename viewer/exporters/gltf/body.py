@@ -15,12 +15,12 @@ from viewer.exporters.gltf.mesh import EXTENSION, Encoding, Placed, add_mesh, pa
 from viewer.exporters.gltf.nodes import Locals, Tree, add_nodes
 from viewer.exporters.gltf.skin import Influences, Shape, influences_of, inverse_bind_matrices
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import FileRecord, Json
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.pose import Pose
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import FileRecord, Json
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.pose import Pose
+from viewer.rigs.skinning import Skinning, skin_used
 
 _SOURCES, _FIGURES, _EXTRAS = "sources", "figures", "extras"
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError
 from viewer.media.image import media_type
-from viewer.rig.file_record import Json
+from viewer.rigs.file_record import Json
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 _TYPES = {

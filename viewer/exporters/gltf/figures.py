@@ -33,15 +33,15 @@ from viewer.exporters.gltf.nodes import locals_of, to_metres
 from viewer.exporters.gltf.skin import shape_of
 from viewer.formats._scene_graph.content import NodeChannel
 from viewer.phrases import agree, counted, listed, optional
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json
-from viewer.rig.motion.evaluation import Frames, frames_of, still_frames, still_pose
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
-from viewer.rig.pose import Pose
-from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json
+from viewer.rigs.motion.evaluation import Frames, frames_of, still_frames, still_pose
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
+from viewer.rigs.pose import Pose
+from viewer.rigs.scalars import length_text
+from viewer.rigs.scene import Actor
+from viewer.rigs.skinning import Skinning
 
 # Comparison of the written animations
 # Maximum number of compared vertices over all times: takes about two seconds.

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from viewer.exporters.gltf.document import Document, Kind, named, text_of
 from viewer.exporters.gltf.mesh import Placed
 from viewer.exporters.gltf.nodes import Locals, Tree
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.quaternion import align_signs
-from viewer.rig.motion.evaluation import Frames
-from viewer.rig.motion.transform_clip import (
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.quaternion import align_signs
+from viewer.rigs.motion.evaluation import Frames
+from viewer.rigs.motion.transform_clip import (
     Interpolation,
     TransformChannel,
     TransformClip,
     TransformPath,
     sample_transforms,
 )
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.skeleton import Skeleton
 
 _Mode: TypeAlias = Literal["LINEAR", "STEP", "CUBICSPLINE"]
 _Targets: TypeAlias = NDArray[np.integer]

@@ -43,16 +43,16 @@ from viewer.formats.gltf.document import Document, open_document, parsed_json
 from viewer.formats.gltf.meshes import read_vertices
 from viewer.formats.gltf.nodes import read_skins, read_tree
 from viewer.phrases import agree, counted, listed, optional
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.kinematics import joint_worlds
-from viewer.rig.motion.evaluation import Frames
-from viewer.rig.scalars import length_text
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin, influence_counts, skin_from_entries
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.kinematics import joint_worlds
+from viewer.rigs.motion.evaluation import Frames
+from viewer.rigs.scalars import length_text
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import Skin, influence_counts, skin_from_entries
+from viewer.rigs.skinning import METHODS, Skinning
 
 Keys: TypeAlias = dict[tuple[int, str], Floats]
 """Animated values by node and path, one row per frame."""

@@ -10,10 +10,10 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.exporters.gltf.document import Document, named
 from viewer.media.png import encode_png
 from viewer.phrases import brief
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.file_record import Json
-from viewer.rig.material import MINIFICATIONS, Texture
-from viewer.rig.mesh import Mesh
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.file_record import Json
+from viewer.rigs.material import MINIFICATIONS, Texture
+from viewer.rigs.mesh import Mesh
 
 Color = tuple[float, float, float]
 _PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour for untextured surfaces

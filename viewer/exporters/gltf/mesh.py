@@ -11,13 +11,13 @@ from viewer.data_classes import dataclass
 from viewer.exporters.gltf.document import INDICES, VERTICES, Document, named, text_of
 from viewer.exporters.gltf.materials import Materials
 from viewer.exporters.gltf.skin import Influences, Shape, influence_sets
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import moved_tangents, unit
-from viewer.rig.mesh import Mesh, split_seams, vertex_normals
-from viewer.rig.skin import influence_counts
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.geometry.vectors import moved_tangents, unit
+from viewer.rigs.mesh import Mesh, split_seams, vertex_normals
+from viewer.rigs.skin import influence_counts
 
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the last of which is reserved

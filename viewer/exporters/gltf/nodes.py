@@ -20,14 +20,14 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.exporters.gltf.document import Document, named, text_of
-from viewer.rig.arrays import Floats
-from viewer.rig.constraints.evaluation import constrained
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.rotation import matrix_to_quaternion
-from viewer.rig.geometry.vectors import SignedUp
-from viewer.rig.pose import Pose, joint_rotations, local_matrices
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.constraints.evaluation import constrained
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
+from viewer.rigs.geometry.vectors import SignedUp
+from viewer.rigs.pose import Pose, joint_rotations, local_matrices
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _HALF = float(np.sqrt(0.5))
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.morph_target import MORPH_GROUP
-from viewer.rig.shape import shaped
-from viewer.rig.skin import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.morph_target import MORPH_GROUP
+from viewer.rigs.shape import shaped
+from viewer.rigs.skin import (
     Skin,
     has_influence,
     influence_counts,

@@ -45,16 +45,16 @@ from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rendering.passes.shadow_passes import GRAZING, SHADOW_OPACITY
 from viewer.rendering.shader_text import embedded_text
 from viewer.rendering.view import FILTER_RADIUS, light_uniforms, view_of
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.inspection.front import guess_front
-from viewer.rig.mesh import bounding_box
-from viewer.rig.motion.evaluation import pose_of
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, Scene, actor_points
-from viewer.rig.skinning import Skinning, skinned
-from viewer.rig.srgb import decode_srgb
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.inspection.front import guess_front
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.motion.evaluation import pose_of
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, Scene, actor_points
+from viewer.rigs.skinning import Skinning, skinned
+from viewer.rigs.srgb import decode_srgb
 
 _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")

@@ -19,11 +19,11 @@ from viewer.rendering.gpu.surfaces import (
     needs_materials,
     surface_uniforms,
 )
-from viewer.rig.arrays import Floats
-from viewer.rig.file_record import Json
-from viewer.rig.material import TEXTURES, Material, Texture
-from viewer.rig.mesh import Mesh, bounding_box, visible_triangles
-from viewer.rig.skin import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.file_record import Json
+from viewer.rigs.material import TEXTURES, Material, Texture
+from viewer.rigs.mesh import Mesh, bounding_box, visible_triangles
+from viewer.rigs.skin import (
     Skin,
     bind_positions,
     has_influence,
@@ -32,7 +32,7 @@ from viewer.rig.skin import (
     strongest_first,
     weight_sums,
 )
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rigs.skinning import Skinning, skin_used
 
 _NORMAL_STEP = 2.0**-11  # 0.03 degrees
 _UV_STEP = 2.0**-17  # a thirtieth of a texel of 4096

@@ -15,17 +15,17 @@ from viewer.data_classes import dataclass
 from viewer.exporters.html.offsets import Fields, principal_fields
 from viewer.exporters.html.packing import Packer
 from viewer.progress import report
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.quaternion import align_signs
-from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose
-from viewer.rig.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
-from viewer.rig.skin import Skin, bind_positions, owners
-from viewer.rig.skinning import Skinning
-from viewer.rig.skinning.dqs import split_palette
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.quaternion import align_signs
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import Pose
+from viewer.rigs.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
+from viewer.rigs.skin import Skin, bind_positions, owners
+from viewer.rigs.skinning import Skinning
+from viewer.rigs.skinning.dqs import split_palette
 
 FINE = 2e-6
 """Step of rounded positions, relative to the figure's size: several such errors, and those of

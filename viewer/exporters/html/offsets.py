@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.progress import report
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 _NEGLIGIBLE = 1e-12  # singular value, relative to the largest, of directions that are never used
 _SPREAD = 8.0  # first guess of the ratio between the largest error and its root mean square

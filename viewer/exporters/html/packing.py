@@ -12,8 +12,8 @@ import zlib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewer.rig.arrays import Floats
-from viewer.rig.file_record import Json
+from viewer.rigs.arrays import Floats
+from viewer.rigs.file_record import Json
 
 _LARGEST = 2.0**30  # differences of two such integers fit into 32 bits
 _MOST_DIFFERENCES = 2  # speeds of smooth motions change little, so their second differences do not

@@ -34,15 +34,15 @@ from viewer.formats._vrm.parts import list_in, part, value_of
 from viewer.formats._vrm.springs import EXTENDED
 from viewer.formats._vrm.upgrade import LICENCE
 from viewer.phrases import Remedy, agree, all_of, counted, listed, rounded
-from viewer.rig.arrays import Floats
-from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.figure import Figure
-from viewer.rig.file_record import Json, VrmRecord
-from viewer.rig.humanoid import REQUIRED_BONES
-from viewer.rig.pose import pose_key
-from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.springs.spring_joints import Springs
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.constraints.constraint import Constraint
+from viewer.rigs.figure import Figure
+from viewer.rigs.file_record import Json, VrmRecord
+from viewer.rigs.humanoid import REQUIRED_BONES
+from viewer.rigs.pose import pose_key
+from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.springs.spring_joints import Springs
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _STRAIGHT = 1e-4  # radians
 _CONSTRAINT = "VRMC_node_constraint"

@@ -7,23 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import between, multiply
-from viewer.rig.geometry.rotation import (
+from viewer.rigs.arrays import Floats
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import between, multiply
+from viewer.rigs.geometry.rotation import (
     matrix_to_quaternion,
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import axis_vector, unit
-from viewer.rig.humanoid import Humanoid
-from viewer.rig.kinematics import joint_worlds, world_matrices
-from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
-from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.units import METRES
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.geometry.vectors import axis_vector, unit
+from viewer.rigs.humanoid import Humanoid
+from viewer.rigs.kinematics import joint_worlds, world_matrices
+from viewer.rigs.pose import Pose, joint_rotations, local_matrices, rest_pose
+from viewer.rigs.shape import shaped
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.units import METRES
 
 _PAIRS = ("UpperLeg", "UpperArm")
 _SMALL = 1e-6  # radians

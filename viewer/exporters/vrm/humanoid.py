@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
-from viewer.rig.figure import Figure
-from viewer.rig.hierarchy import path_to_root
-from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
-from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.skeleton import Skeleton
+from viewer.rigs.figure import Figure
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.skeleton import Skeleton
 
 _ABOVE = {
     **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from viewer.exporters.gltf.body import Built
 from viewer.exporters.gltf.document import Document
 from viewer.formats._vrm.parts import is_index, list_in, part
-from viewer.rig.file_record import Json, VrmRecord
+from viewer.rigs.file_record import Json, VrmRecord
 
 _SPRINGS = "VRMC_springBone"
 _BINDS = {

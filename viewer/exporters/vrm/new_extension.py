@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from viewer.exporters.gltf.body import Body, Built
-from viewer.rig.file_record import Json
-from viewer.rig.mesh import Mesh, PartView
+from viewer.rigs.file_record import Json
+from viewer.rigs.mesh import Mesh, PartView
 
 PRESETS = (
     *("happy", "angry", "sad", "relaxed", "surprised", "neutral"),

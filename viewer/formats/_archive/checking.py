@@ -13,7 +13,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST
 from viewer.phrases import listed, optional, rounded
-from viewer.rig.arrays import Bools, Deferred, Floats, Ints
+from viewer.rigs.arrays import Bools, Deferred, Floats, Ints
 
 _ROWS = {
     "positions": "vertex {index}",

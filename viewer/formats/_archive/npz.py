@@ -30,7 +30,7 @@ from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, 
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory, opened_member
 from viewer.formats._source import InvalidValueError, Source, too_large
 from viewer.phrases import axes
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 _MAX_AXES = 32
 _CHUNK = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying

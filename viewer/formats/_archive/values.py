@@ -22,7 +22,7 @@ from viewer.errors import FormatError
 from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import axes, counted, printable
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 _WANTED = {"biuf": "number", "iuf": "number", "iu": "integer", "SU": "string"}
 """Names of the elements of arrays, by numpy's kind letters."""

@@ -35,7 +35,7 @@ from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn,
 from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys
 from viewer.phrases import counted, printable
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 
 def warn_of_rest(machine: Machine) -> None:

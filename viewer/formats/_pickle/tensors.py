@@ -22,7 +22,7 @@ from viewer.formats._archive.zip import MAX_RATIO, SMALL
 from viewer.formats._pickle.values import Span, StandIn, is_sizes
 from viewer.formats._source import InvalidValueError
 from viewer.phrases import axes, counted
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 _STORAGES = {
     "FloatStorage": "f4",

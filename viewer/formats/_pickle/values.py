@@ -22,7 +22,7 @@ from viewer.formats._archive.values import array_dtype, item_count, shaped
 from viewer.formats._archive.zip import Data
 from viewer.formats._source import InvalidValueError
 from viewer.phrases import axes
-from viewer.rig.arrays import Deferred
+from viewer.rigs.arrays import Deferred
 
 _MOST_AXES = 32
 _PIECE = 1 << 20  # number of bytes converted at a time

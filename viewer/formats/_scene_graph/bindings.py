@@ -16,8 +16,8 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeSkin
 from viewer.formats._scene_graph.joints import Joints
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.transform import affine_matrices
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.transform import affine_matrices
 
 # float32 rounding of the entries of a product of two matrices, relative to the largest
 _SAME = 1e-6

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.file_record import Json, StoredTextures
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.material import Material
-from viewer.rig.mesh import PartView
-from viewer.rig.motion.transform_clip import Interpolation, TransformPath
-from viewer.rig.springs.spring_joints import Springs
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.constraints.constraint import Constraint
+from viewer.rigs.file_record import Json, StoredTextures
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import PartView
+from viewer.rigs.motion.transform_clip import Interpolation, TransformPath
+from viewer.rigs.springs.spring_joints import Springs
 
 REACH = 1e18
 """Largest coordinate that can be drawn: the squares of lengths must fit into single precision."""
@@ -47,7 +47,7 @@ class NodeFile:
     up: Up = "y"
     """Up axis of the file."""
     unit: str = "m"
-    """Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown."""
+    """Unit of length, a key of ``viewer.rigs.units.METRES``; empty if unknown."""
     extensions: Mapping[str, Any] = field(default_factory=dict)
     """Parsed JSON of the root's extensions, such as ``VRMC_vrm``."""
     extras: Any = None
@@ -266,7 +266,7 @@ class NodeAnimation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeChannel:
-    """Keys of one property of one node; see ``viewer.rig.motion.transform_clip``."""
+    """Keys of one property of one node; see ``viewer.rigs.motion.transform_clip``."""
 
     node: int
     """Node that moves."""
@@ -301,7 +301,7 @@ class NodeCamera:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeExpression:
-    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``."""
+    """A facial expression: a weighted sum of morph targets; see ``viewer.rigs.expressions``."""
 
     name: str
     """As in the file."""

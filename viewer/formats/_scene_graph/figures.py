@@ -26,11 +26,11 @@ from viewer.formats._scene_graph.surfaces import (
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
 from viewer.phrases import Remedy, agree, counted, listed, quoted, rounded
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure, FigureGroup, read_from
-from viewer.rig.file_record import FileRecord, VrmRecord
-from viewer.rig.hierarchy import with_ancestors
-from viewer.rig.motion.transform_clip import Animation
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure, FigureGroup, read_from
+from viewer.rigs.file_record import FileRecord, VrmRecord
+from viewer.rigs.hierarchy import with_ancestors
+from viewer.rigs.motion.transform_clip import Animation
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source

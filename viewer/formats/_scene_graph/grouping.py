@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeTree
-from viewer.rig.hierarchy import roots_of, with_ancestors
+from viewer.rigs.hierarchy import roots_of, with_ancestors
 
 _MOST_TREES = 16  # maximum number of separate figures made from root trees of rigid meshes
 _MOST_COPIES = 4  # maximum number of joints of all figures, relative to the number of nodes

@@ -9,13 +9,13 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeTree
-from viewer.rig.arrays import Floats
-from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
-from viewer.rig.humanoid import Humanoid
-from viewer.rig.kinematics import joint_worlds
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.springs.spring_joints import Colliders, Springs
+from viewer.rigs.arrays import Floats
+from viewer.rigs.constraints.constraint import Constraint
+from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rigs.humanoid import Humanoid
+from viewer.rigs.kinematics import joint_worlds
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.springs.spring_joints import Colliders, Springs
 
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 _BY_SPRING = ("tails", "stiffness", "drags", "gravities", "radii")

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeAnimation, NodeChannel
-from viewer.rig.arrays import Ints
-from viewer.rig.motion.transform_clip import Animation, TransformChannel, TransformClip
+from viewer.rigs.arrays import Ints
+from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
 
 Reader: TypeAlias = Callable[[], tuple[NodeChannel, ...]]
 """Returns the channels of an animation."""

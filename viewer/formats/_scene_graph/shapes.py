@@ -18,10 +18,10 @@ from viewer.formats._scene_graph.surfaces import (
     part_name,
     used_materials,
 )
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.bodies.offsets import DeferredOffsets
-from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules, MaterialBinds
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.bodies.offsets import DeferredOffsets
+from viewer.rigs.expressions import OVERRIDES, PROCEDURAL, ExpressionRules, MaterialBinds
 
 
 def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:

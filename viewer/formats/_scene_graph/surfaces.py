@@ -17,10 +17,10 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.bindings import Bindings
 from viewer.formats._scene_graph.content import NodeFile, Primitive
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.vectors import moved_tangents
-from viewer.rig.mesh import Mesh, PartView, triangle_areas, vertex_normals
-from viewer.rig.skin import Skin
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.geometry.vectors import moved_tangents
+from viewer.rigs.mesh import Mesh, PartView, triangle_areas, vertex_normals
+from viewer.rigs.skin import Skin
 
 _NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
 _MOST_TRIANGLES = 200_000  # largest primitive that is shaded flat

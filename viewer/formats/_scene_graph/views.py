@@ -12,10 +12,10 @@ from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeCamera, NodeFile, NodeTree
 from viewer.formats._scene_graph.grouping import Members
 from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
-from viewer.rig.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
-from viewer.rig.file_record import FileRecord
-from viewer.rig.hierarchy import path_to_root, with_ancestors
-from viewer.rig.motion.transform_clip import Animation
+from viewer.rigs.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
+from viewer.rigs.file_record import FileRecord
+from viewer.rigs.hierarchy import path_to_root, with_ancestors
+from viewer.rigs.motion.transform_clip import Animation
 
 _HEIGHT = 1080  # height of a view, pixels
 _ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none

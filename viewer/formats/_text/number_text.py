@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.arrays import Bytes, Floats, Item
+from viewer.rigs.arrays import Bytes, Floats, Item
 
 _AT_ONCE = 1 << 13  # numbers per part, whose temporary arrays stay in the processor's cache
 _EXACT = 1e15  # integers of up to 15 digits survive the conversion to float64 and back

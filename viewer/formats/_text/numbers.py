@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.progress import report_bytes
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 LARGEST = float(np.finfo(np.float32).max)
 """Numbers beyond this become infinite on the GPU, so they are refused."""

@@ -19,7 +19,7 @@ from viewer.formats._text.numbers import (
     word_begins,
 )
 from viewer.phrases import quoted
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 _Places = NDArray[np.int64]
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")

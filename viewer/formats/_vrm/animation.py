@@ -22,14 +22,14 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.parts import is_index, part
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.hierarchy import path_to_root
-from viewer.rig.motion.evaluation import frames_of
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.motion.timing import Timing, frame_at, frame_times
-from viewer.rig.motion.transform_clip import TransformClip, is_regular
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.motion.evaluation import frames_of
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.motion.timing import Timing, frame_at, frame_times
+from viewer.rigs.motion.transform_clip import TransformClip, is_regular
 
 EXTENSION = "VRMC_vrm_animation"
 _MOST_FRAMES = 1_000_000

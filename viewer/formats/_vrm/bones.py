@@ -8,7 +8,7 @@ from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part
 from viewer.phrases import quoted
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
+from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES
 
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 

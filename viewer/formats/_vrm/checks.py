@@ -12,8 +12,8 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.parts import list_in, part
 from viewer.phrases import counted, listed, quoted
-from viewer.rig.file_record import Json
-from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+from viewer.rigs.file_record import Json
+from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 
 _MODERN = "1.0"
 MOST_WEIGHT = {0: 100.0, 1: 1.0}

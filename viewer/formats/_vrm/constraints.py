@@ -14,8 +14,8 @@ from viewer.formats._scene_graph.content import NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part, value_of
 from viewer.phrases import listed
-from viewer.rig.constraints.constraint import Constraint, ConstraintKind
-from viewer.rig.hierarchy import path_to_root
+from viewer.rigs.constraints.constraint import Constraint, ConstraintKind
+from viewer.rigs.hierarchy import path_to_root
 
 _EXTENSION = "VRMC_node_constraint"
 _KINDS: tuple[ConstraintKind, ...] = ("roll", "aim", "rotation")

@@ -28,13 +28,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
-from viewer.rig.arrays import Floats
-from viewer.rig.expressions import COLOR_KINDS, TRANSFORM
-from viewer.rig.file_record import Json
-from viewer.rig.srgb import decode_srgb
+from viewer.rigs.arrays import Floats
+from viewer.rigs.expressions import COLOR_KINDS, TRANSFORM
+from viewer.rigs.file_record import Json
+from viewer.rigs.srgb import decode_srgb
 
 _Bind = tuple[int, str, Floats]
-"""Material, kind and target (4,), as in ``viewer.rig.expressions.MaterialBinds``."""
+"""Material, kind and target (4,), as in ``viewer.rigs.expressions.MaterialBinds``."""
 _COLORS = {
     "_Color": "color",
     "_EmissionColor": "emissionColor",

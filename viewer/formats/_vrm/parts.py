@@ -7,8 +7,8 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
-from viewer.rig.file_record import Json
+from viewer.rigs.arrays import Floats
+from viewer.rigs.file_record import Json
 
 
 def part(told: object, *names: str) -> Any:

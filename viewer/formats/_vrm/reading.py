@@ -20,9 +20,9 @@ from viewer.formats._vrm.parts import is_index, list_in, part, value_of
 from viewer.formats._vrm.springs import read_springs
 from viewer.formats._vrm.upgrade import NamedExpression, nodes_with_mesh, upgrade
 from viewer.phrases import listed, quoted
-from viewer.rig.arrays import Floats
-from viewer.rig.expressions import OVERRIDES, PROCEDURAL
-from viewer.rig.mesh import PartView
+from viewer.rigs.arrays import Floats
+from viewer.rigs.expressions import OVERRIDES, PROCEDURAL
+from viewer.rigs.mesh import PartView
 
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
 

@@ -28,10 +28,10 @@ from viewer.diagnostics import wording
 from viewer.formats._scene_graph.content import NodeFile, NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.hierarchy import path_to_root
-from viewer.rig.springs.spring_joints import INSIDE, OUTSIDE, PLANE, Colliders, Springs
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.springs.spring_joints import INSIDE, OUTSIDE, PLANE, Colliders, Springs
 
 _EXTENSION = "VRMC_springBone"
 EXTENDED = "VRMC_springBone_extended_collider"

@@ -19,9 +19,9 @@ from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.materials import modern_toon, upgraded_binds
 from viewer.formats._vrm.parts import is_index, list_in, objects_in, part, rows_of, value_of
 from viewer.formats._vrm.springs import end_below
-from viewer.rig.arrays import Floats
-from viewer.rig.expressions import OLD_PRESETS
-from viewer.rig.file_record import Json, StoredTextures
+from viewer.rigs.arrays import Floats
+from viewer.rigs.expressions import OLD_PRESETS
+from viewer.rigs.file_record import Json, StoredTextures
 
 LICENCE = "https://vrm.dev/licenses/1.0/"
 """The VRM Public Licence, the only one that VRM 1.0 accepts."""

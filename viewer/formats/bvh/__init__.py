@@ -44,12 +44,12 @@ from viewer.formats.bvh.motion import (
     shifts_of,
     translations_of,
 )
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.motion.timing import DEFAULT_RATE, Timing
-from viewer.rig.skeleton import ball_skeleton
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.motion.timing import DEFAULT_RATE, Timing
+from viewer.rigs.skeleton import ball_skeleton
 
 _LARGEST_RATIO = 8  # maximum ratio of rotations to numbers in the file
 _SMALL_CLIP = 1 << 24  # number of rotations up to which any ratio is accepted

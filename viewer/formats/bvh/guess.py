@@ -7,15 +7,15 @@ import numpy as np
 from viewer.diagnostics import Phrase, wording
 from viewer.formats._source import Source
 from viewer.phrases import Remedy, Shown, bare, rounded
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.motion.evaluation import frames_of, world_frames
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
-from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.skeleton import Skeleton
-from viewer.rig.units import METRES, SIZES, UNIT_NAMES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.motion.evaluation import frames_of, world_frames
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.units import METRES, SIZES, UNIT_NAMES
 
 Facts = tuple[tuple[str, str], ...]
 _INCHES = (30.0, 90.0)  # heights of humans in inches, 0.76 to 2.3 m
@@ -173,7 +173,7 @@ def _lies(posed: Floats, along: str, up: Up, size: float) -> bool:
 def _stands_on_four_legs(skeleton: Skeleton, points: Floats) -> bool:
     """Return whether a skeleton has an animal's legs if y is up, but not if z is."""
     # Imported here because few files need it.
-    from viewer.rig.feet.legs import animal_legs
+    from viewer.rigs.feet.legs import animal_legs
 
     joints = points[: skeleton.n_joints]
     return [bool(animal_legs(skeleton.parents, joints, up)) for up in np.eye(3)[1:]] == [

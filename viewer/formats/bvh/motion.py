@@ -23,8 +23,8 @@ from viewer.formats._text.words import Words, number_key, read_words, refuse_wor
 from viewer.formats._translation_limit import FARTHEST, is_beyond
 from viewer.formats.bvh.hierarchy import BvhJoint, read_hierarchy
 from viewer.phrases import brief, counted, optional, quoted, rounded
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.geometry.quaternion import align_signs
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.geometry.quaternion import align_signs
 
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)

@@ -16,8 +16,8 @@ import numpy as np
 
 from viewer.formats._text.number_text import fixed_texts
 from viewer.progress import report
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.hierarchy import depth_first
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.hierarchy import depth_first
 
 _SPACES = " \t\n\r\v\f"  # white space of the format
 

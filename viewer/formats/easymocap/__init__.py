@@ -61,13 +61,13 @@ from viewer.formats.easymocap.files import (
 )
 from viewer.phrases import counted, listed, one_of, optional, printable
 from viewer.progress import report
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.capture import Capture, CapturePart
-from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
-from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.geometry.vectors import StatedUp
-from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.captures.capture import Capture, CapturePart
+from viewer.rigs.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
+from viewer.rigs.captures.person import is_tracked, person_label
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.geometry.vectors import StatedUp
+from viewer.rigs.motion.body_motion import BodyMotion
 
 _LEVELS = 3  # number of folders that may contain the cameras, from the folder of the frames upwards
 

@@ -31,11 +31,11 @@ from viewer.formats.easymocap.files import (
     width_of,
 )
 from viewer.phrases import one_of
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers
-from viewer.rig.geometry.vectors import StatedUp
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.bodies.smpl_family import FAMILY, members_by_numbers
+from viewer.rigs.geometry.vectors import StatedUp
+from viewer.rigs.motion.body_motion import BodyMotion
+from viewer.rigs.motion.timing import Timing
 
 COEFFICIENTS = ("shapes", "expression")
 """Keys of a record that later records of the same person may omit."""

@@ -35,9 +35,9 @@ from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
 from viewer.media.image import decode_picture, picture_dimensions
 from viewer.phrases import axes, listed, printable, quoted
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.cameras import CameraImage, CameraView
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.cameras import CameraImage, CameraView
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 
 _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
 _KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
@@ -372,7 +372,7 @@ class ImageFolders:
         return tuple(name for name, files in self._files.items() if files)
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the image at a time; see ``viewer.rig.captures.cameras``."""
+        """Return the image at a time; see ``viewer.rigs.captures.cameras``."""
         files = self._files.get(camera, {})
         number = self._frames.start + round(seconds * self._rate)
         known = self._shown.get(camera)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source
-    from viewer.rig.figure import FigureGroup
+    from viewer.rigs.figure import FigureGroup
 
 
 def read(source: Source) -> FigureGroup:

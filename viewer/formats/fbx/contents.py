@@ -41,10 +41,10 @@ from viewer.formats.fbx.message import Arrays, unpacked
 from viewer.media.image import decode_picture
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import agree, counted, listed, optional, quoted, rounded
-from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.file_record import Json
-from viewer.rig.material import Material, Texture
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rigs.arrays import Bytes, Floats, Ints
+from viewer.rigs.file_record import Json
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _BINARY = b"Kaydara FBX Binary"  # first bytes of the binary variant
 _UNSTRUCTURED = re.compile(rb'"[^"]*"|;[^\n]*')  # strings and comments of the text variant

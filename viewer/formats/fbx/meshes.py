@@ -14,8 +14,8 @@ from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeSkin
 from viewer.formats._source import Source
 from viewer.formats.fbx.message import Arrays
 from viewer.phrases import agree, counted, quoted
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.file_record import Json
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.file_record import Json
 
 
 @dataclass(frozen=True, slots=True)

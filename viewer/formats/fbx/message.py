@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.file_record import Json
+from viewer.rigs.file_record import Json
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 """Arrays by the names that the JSON uses for them."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats.fbx.message import Arrays, packed
-from viewer.rig.file_record import Json
+from viewer.rigs.file_record import Json
 
 _METRES = (1.0, 0.01, 0.001, 0.0254)  # metres per unit, for the units that figures can have
 _LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter

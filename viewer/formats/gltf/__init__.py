@@ -46,10 +46,10 @@ from viewer.formats.gltf.nodes import (
     shown_scene,
 )
 from viewer.formats.gltf.toon import stored_textures, stored_toon
-from viewer.rig.figure import FigureGroup
+from viewer.rigs.figure import FigureGroup
 
 if TYPE_CHECKING:
-    from viewer.rig.motion.skeleton_motion import SkeletonMotion
+    from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 
 _VRM = {"VRM", "VRMC_vrm"}
 _MOTION = "VRMC_vrm_animation"

@@ -11,7 +11,7 @@ from viewer.data_classes import dataclass
 from viewer.formats.gltf.buffers import Buffers, View
 from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import counted, one_of
-from viewer.rig.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints
 
 _COMPONENTS: dict[int, np.dtype[np.number]] = {
     5120: np.dtype("<i1"),

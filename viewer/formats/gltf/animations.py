@@ -22,8 +22,8 @@ from viewer.formats._scene_graph.content import NodeAnimation, NodeChannel, Node
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import counted, listed, rounded
-from viewer.rig.arrays import Floats
-from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, Interpolation, TransformPath
+from viewer.rigs.arrays import Floats
+from viewer.rigs.motion.transform_clip import TRANSFORM_PATHS, Interpolation, TransformPath
 
 _SAME_TIME = 1e-4  # rounding error of times in JSON, seconds
 _TINY = 1e-12  # minimum length of a quaternion with a direction

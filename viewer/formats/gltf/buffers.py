@@ -17,7 +17,7 @@ from viewer.formats._source import read_bytes
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.meshopt import decoded_view, meshopt_of
 from viewer.phrases import counted, quoted
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,10 +19,10 @@ from viewer.formats._vrm.parts import list_in, objects_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.phrases import agree, counted, listed, printable, rounded
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.file_record import Json
-from viewer.rig.hierarchy import descendants, roots_of
-from viewer.rig.inspection.faults import UNIT_ROTATION
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.file_record import Json
+from viewer.rigs.hierarchy import descendants, roots_of
+from viewer.rigs.inspection.faults import UNIT_ROTATION
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _NORMAL_ROUNDING = 5e-4  # tolerance of lengths and of the sign of tangents

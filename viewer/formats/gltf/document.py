@@ -31,7 +31,7 @@ from viewer.formats.gltf.accessors import Accessors
 from viewer.formats.gltf.buffers import Buffers
 from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import agree, counted, printable, quoted
-from viewer.rig.file_record import Json
+from viewer.rigs.file_record import Json
 
 _MAGIC = b"glTF"  # first bytes of a GLB
 _HEADER = struct.Struct("<4sII")

@@ -14,8 +14,8 @@ from viewer.formats._archive.values import describe
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import one_of, quoted
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.file_record import Json
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.file_record import Json
 
 _Choice = TypeVar("_Choice", int, str)
 _ONE = {

@@ -15,8 +15,8 @@ from viewer.formats._vrm.parts import objects_in
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
 from viewer.phrases import agree, counted, listed
-from viewer.rig.file_record import Json
-from viewer.rig.hierarchy import descendants
+from viewer.rigs.file_record import Json
+from viewer.rigs.hierarchy import descendants
 
 # Extensions of geometry and animation, and of characters; materials and textures list their own.
 _GEOMETRY = (

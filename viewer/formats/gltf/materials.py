@@ -33,10 +33,10 @@ from viewer.formats.gltf.textures import (
 )
 from viewer.formats.gltf.toon import MTOON, Toon, read_toon
 from viewer.phrases import counted
-from viewer.rig.arrays import Bytes
-from viewer.rig.file_record import Json
-from viewer.rig.material import ALPHA_MODES, Material
-from viewer.rig.srgb import decode_srgb, encode_srgb
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.file_record import Json
+from viewer.rigs.material import ALPHA_MODES, Material
+from viewer.rigs.srgb import decode_srgb, encode_srgb
 
 _GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 DRAWN_EXTENSIONS = (

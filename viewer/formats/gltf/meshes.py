@@ -24,7 +24,7 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.draco import decoded_primitive
 from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 
 _LIST, _STRIP, _FAN = 4, 5, 6
 _TRIANGLES = (_LIST, _STRIP, _FAN)  # all other modes draw points or lines

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
 from viewer.formats.gltf.elements import Element
-from viewer.rig.arrays import Bytes, Floats
+from viewer.rigs.arrays import Bytes, Floats
 
 _NAMES = ("KHR_meshopt_compression", "EXT_meshopt_compression")
 _MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")

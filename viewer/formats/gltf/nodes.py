@@ -24,15 +24,15 @@ from viewer.formats._scene_graph.content import (
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table, member_indices, member_rows
 from viewer.phrases import counted, listed, quoted, rounded
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.file_record import Json
-from viewer.rig.geometry.rotation import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.file_record import Json
+from viewer.rigs.geometry.rotation import (
     matrix_to_quaternion,
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rig.hierarchy import cycle_members, roots_of
-from viewer.rig.inspection.faults import UNIT_ROTATION
+from viewer.rigs.hierarchy import cycle_members, roots_of
+from viewer.rigs.inspection.faults import UNIT_ROTATION
 
 _TINY = 1e-12  # minimum length of a quaternion with a direction
 

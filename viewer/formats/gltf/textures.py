@@ -25,9 +25,9 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.media.image import decoding_pictures
 from viewer.phrases import one_of, quoted
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.file_record import Json
-from viewer.rig.material import MINIFICATIONS, Texture
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.file_record import Json
+from viewer.rigs.material import MINIFICATIONS, Texture
 
 _WRAPS = {33071: "clamp", 10497: "repeat", 33648: "mirror"}
 _NEAREST, _LINEAR = 9728, 9729

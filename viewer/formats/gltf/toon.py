@@ -28,8 +28,8 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
 from viewer.phrases import Shown, counted, listed
-from viewer.rig.file_record import Json, StoredImage, StoredTextures
-from viewer.rig.material import Outline, OutlineMode, Rim
+from viewer.rigs.file_record import Json, StoredImage, StoredTextures
+from viewer.rigs.material import Outline, OutlineMode, Rim
 
 MTOON = "VRMC_materials_mtoon"
 _SHADER = "VRM/MToon"

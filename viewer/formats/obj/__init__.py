@@ -51,11 +51,11 @@ from viewer.formats.obj.lines import (
 )
 from viewer.formats.obj.mtl import read_libraries
 from viewer.phrases import counted, listed, optional, quoted
-from viewer.rig.arrays import Bools, Floats, Ints, freeze
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh
-from viewer.rig.srgb import decode_srgb
+from viewer.rigs.arrays import Bools, Floats, Ints, freeze
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.srgb import decode_srgb
 
 _HEAD = 4096  # number of bytes within which files written by this program state the up axis
 _SHORTEST = 1e-9  # length of the mean below which unit normals cancel each other out

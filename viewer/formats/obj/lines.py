@@ -21,7 +21,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_words, to_number, word_begins
 from viewer.formats._text.words import Words, refuse_words
 from viewer.phrases import counted, quoted
-from viewer.rig.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats
 
 KEYWORDS = ("v", "vt", "vn", "f")
 """Keywords of the lines that contain numbers."""

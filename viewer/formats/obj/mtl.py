@@ -32,8 +32,8 @@ from viewer.formats._references import is_file, load_image, referenced_path, ref
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, to_number
 from viewer.phrases import counted, listed, quoted
-from viewer.rig.arrays import Bytes
-from viewer.rig.material import AlphaMode, Material, Texture, Wrap
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.material import AlphaMode, Material, Texture, Wrap
 
 _COLORS = {b"kd": "diffuse", b"ke": "emissive"}
 _NUMBERS = {b"pr": "roughness", b"pm": "metallic", b"d": "opacity", b"tr": "transparency"}

@@ -37,11 +37,11 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.ply.elements import CORNERS, Header, Table, read_header, read_tables
 from viewer.phrases import counted, listed, printable
-from viewer.rig.arrays import Floats, Ints, freeze
-from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
-from viewer.rig.mesh import Mesh
-from viewer.rig.srgb import decode_srgb
+from viewer.rigs.arrays import Floats, Ints, freeze
+from viewer.rigs.figure import Figure
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.srgb import decode_srgb
 
 _Indices = NDArray[np.integer]
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))

@@ -43,13 +43,13 @@ from viewer.formats.skin.sections import (
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
 from viewer.phrases import all_of, optional, printable, rounded
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.inspection.faults import are_singular
-from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh, without_seams
-from viewer.rig.skin import Skin, skin_rows
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.inspection.faults import are_singular
+from viewer.rigs.material import Material
+from viewer.rigs.mesh import Mesh, without_seams
+from viewer.rigs.skin import Skin, skin_rows
 
 
 def read(source: Source) -> Figure:

@@ -26,9 +26,9 @@ from viewer.formats._text.number_text import dumped
 from viewer.formats._text.numbers import is_number, parse_few, parse_numbers, to_number
 from viewer.formats._text.words import Words, read_words, refuse_words
 from viewer.phrases import bare, counted, optional, quoted
-from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.material import Material, Texture
-from viewer.rig.skin import Skin
+from viewer.rigs.arrays import Bytes, Floats, Ints
+from viewer.rigs.material import Material, Texture
+from viewer.rigs.skin import Skin
 
 KEYWORDS = frozenset(
     (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")

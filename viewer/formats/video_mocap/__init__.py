@@ -15,7 +15,7 @@ from viewer.formats.video_mocap.results import Options as Options
 from viewer.formats.video_mocap.results import Results, capture_of
 from viewer.formats.video_mocap.tools import TOOLS, folder_tool, module_of, tool_of
 from viewer.phrases import listed, printable
-from viewer.rig.captures.capture import Capture
+from viewer.rigs.captures.capture import Capture
 
 _LISTED = 12  # maximum number of keys listed in a message
 

@@ -21,10 +21,10 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import Frames, has, places, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track
-from viewer.rig.arrays import Floats
-from viewer.rig.bodies.smpl_family import members_by_numbers
-from viewer.rig.captures.capture import RestRoots
-from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.arrays import Floats
+from viewer.rigs.bodies.smpl_family import members_by_numbers
+from viewer.rigs.captures.capture import RestRoots
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 
 _NAMES = {
     "GVHMR": {"world": "smpl_params_global", "camera": "smpl_params_incam"},

@@ -23,8 +23,8 @@ from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._source import Source
 from viewer.phrases import counted, rounded
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
 Frames = NDArray[np.int64]
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.

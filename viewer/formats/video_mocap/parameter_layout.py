@@ -38,8 +38,8 @@ from viewer.formats.video_mocap.numbers import (
     person_number,
     shape_form,
 )
-from viewer.rig.arrays import Deferred
-from viewer.rig.bodies.smpl_family import gender_of, members_by_numbers
+from viewer.rigs.arrays import Deferred
+from viewer.rigs.bodies.smpl_family import gender_of, members_by_numbers
 
 _WHOLE = (
     *("pose_world", "poses_world", "poses", "pose", "fullpose", "full_pose", "smpl_poses"),

@@ -52,9 +52,9 @@ from viewer.formats.video_mocap.parameter_layout import (
 )
 from viewer.formats.video_mocap.results import Results, Track
 from viewer.phrases import agree, counted, listed, optional, printable
-from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.bodies.smpl_family import FAMILY, gender_of
-from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
+from viewer.rigs.arrays import Deferred, Floats
+from viewer.rigs.bodies.smpl_family import FAMILY, gender_of
+from viewer.rigs.motion.timing import FASTEST, SLOWEST, is_rate
 
 _AMASS = {
     *("poses", "pose", "fullpose", "smpl_poses"),

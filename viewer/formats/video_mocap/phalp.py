@@ -30,8 +30,8 @@ from viewer.formats.video_mocap.numbers import (
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rigs.arrays import Deferred, Floats
+from viewer.rigs.bodies.smpl_family import FAMILY
 
 # Focal length and image size of the network, pixels; the image is scaled to the longer side.
 _FOCAL, _IMAGE = 5000.0, 256.0

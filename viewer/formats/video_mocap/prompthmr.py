@@ -32,8 +32,8 @@ from viewer.formats.video_mocap.numbers import (
     rows,
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse
-from viewer.rig.arrays import Floats
-from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rigs.arrays import Floats
+from viewer.rigs.bodies.smpl_family import FAMILY
 
 _SPACES = {"world": "smplx_world", "camera": "smplx_cam"}
 _WAYS = (("Rcw", "Tcw", False), ("Rwc", "Twc", True), ("pred_cam_R", "pred_cam_T", True))

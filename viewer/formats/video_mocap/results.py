@@ -16,16 +16,16 @@ from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
 from viewer.phrases import agree, counted, listed
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.bodies.smpl_family import ShapeSpace
-from viewer.rig.captures.cameras import CameraMotion, CameraView
-from viewer.rig.captures.capture import Capture, CapturePart, RestRoots, capture_rate
-from viewer.rig.captures.person import person_label
-from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.geometry.rotation import matrix_to_rotation_vector
-from viewer.rig.geometry.vectors import StatedUp
-from viewer.rig.motion.body_motion import BodyMotion, ParameterMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.captures.cameras import CameraMotion, CameraView
+from viewer.rigs.captures.capture import Capture, CapturePart, RestRoots, capture_rate
+from viewer.rigs.captures.person import person_label
+from viewer.rigs.captures.points import PointClip, PointLayout
+from viewer.rigs.geometry.rotation import matrix_to_rotation_vector
+from viewer.rigs.geometry.vectors import StatedUp
+from viewer.rigs.motion.body_motion import BodyMotion, ParameterMotion
+from viewer.rigs.motion.timing import Timing
 
 _LARGEST = 1 << 20  # maximum width and height of a video, pixels
 _MOST_FRAMES = 1 << 22  # maximum number of frames: 38 hours at 30 frames per second

@@ -36,8 +36,8 @@ from viewer.formats.video_mocap.numbers import (
     rows,
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track
-from viewer.rig.arrays import Floats
-from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rigs.arrays import Floats
+from viewer.rigs.bodies.smpl_family import FAMILY
 
 _RESULTS, _POSES, _PLACES, _SHAPES = "results", "smpl_thetas", "cam_trans", "smpl_betas"
 _TRACKS, _JOINTS, _PIXELS = "track_ids", "joints", "pj2d_org"

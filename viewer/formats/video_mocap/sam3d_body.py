@@ -33,8 +33,8 @@ from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, first_rows, intrinsics_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track
 from viewer.phrases import listed
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointLayout
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.points import PointLayout
 
 _KEYPOINTS, _JOINTS, _VERTICES = "pred_keypoints_3d", "pred_joint_coords", "pred_vertices"
 _ROTATIONS, _PLACE, _SEEN = "pred_global_rots", "pred_cam_t", "pred_keypoints_2d"

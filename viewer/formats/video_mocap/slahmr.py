@@ -25,9 +25,9 @@ from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, has, intrinsics_of, rotations_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track, moved
 from viewer.phrases import counted
-from viewer.rig.arrays import Bools
-from viewer.rig.bodies.smpl_family import members_by_numbers
-from viewer.rig.geometry.vectors import StatedUp
+from viewer.rigs.arrays import Bools
+from viewer.rigs.bodies.smpl_family import members_by_numbers
+from viewer.rigs.geometry.vectors import StatedUp
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
 _TRACKS = "track_info.json"

@@ -34,9 +34,9 @@ from viewer.formats.video_mocap.numbers import (
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse, moved
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
-from viewer.rig.bodies.smpl_family import FAMILY
-from viewer.rig.geometry.vectors import SignedUp, StatedUp
+from viewer.rigs.arrays import Floats
+from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.geometry.vectors import SignedUp, StatedUp
 
 _TRACK = re.compile(r"hps_track_(\d{1,6})\.npy")
 _FOLDER, _CAMERA = "hps", "camera.npy"

@@ -25,7 +25,7 @@ from viewer.formats.video_mocap.numbers import (
     rows,
 )
 from viewer.formats.video_mocap.results import Results, Track
-from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rigs.bodies.smpl_family import FAMILY
 
 _KEYS = {"world": ("pose_world", "trans_world"), "camera": ("pose", "trans")}
 

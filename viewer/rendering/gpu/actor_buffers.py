@@ -17,8 +17,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
-from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor
 
 if TYPE_CHECKING:
     from viewer.rendering.passes.keypoint_pass import KeypointBuffers

@@ -14,15 +14,15 @@ import numpy as np
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.joint_spheres import box_spheres, skin_spheres
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.topology import Shell
-from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import Mesh, bounding_box
-from viewer.rig.pose import Pose
-from viewer.rig.skin import Skin, skin_rows
-from viewer.rig.skinning import Skinning, skinned
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.topology import Shell
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import Mesh, bounding_box
+from viewer.rigs.pose import Pose
+from viewer.rigs.skin import Skin, skin_rows
+from viewer.rigs.skinning import Skinning, skinned
 
 Region = tuple[int, int, int, int]
 """Left, bottom, width and height in pixels, from the lower left corner."""
@@ -62,7 +62,7 @@ class BackFaces:
         """Return the vertices around openings in a pose, figure space: (B, 3)."""
         if not len(shell.borders):
             return np.zeros((0, 3))
-        from viewer.rig.shape import rest_positions
+        from viewer.rigs.shape import rest_positions
 
         skin = figure.require_skin()
         palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)

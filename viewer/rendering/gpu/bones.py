@@ -19,12 +19,12 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import BoneStyle
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skeleton import Skeleton, shown_joints, shown_parents
 
 # Balls at joints.
 _BALL = -2  # value of the child's index that marks a ball

@@ -9,8 +9,8 @@ from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer, float32, matrix_texture, write_stacked
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.mesh import bounding_box
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.mesh import bounding_box
 
 _MANY = 1000  # minimum number of boxes for which coincident boxes are searched
 

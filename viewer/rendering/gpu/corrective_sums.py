@@ -19,9 +19,9 @@ from viewer.rendering.gpu.context import storage_limit
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer, float32, reserved
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import Correctives, active_rows
-from viewer.rig.bodies.offsets import SparseOffsets
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.blendshapes import Correctives, active_rows
+from viewer.rigs.bodies.offsets import SparseOffsets
 
 Way: TypeAlias = Literal["cpu", "gpu"]
 WAYS: tuple[Way, ...] = ("cpu", "gpu")

@@ -18,11 +18,11 @@ from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rendering.gpu.surfaces import PLAIN, Surface
 from viewer.rendering.gpu.upload import buffer
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import bounding_box, split_seams
-from viewer.rig.scene import Scene
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import bounding_box, split_seams
+from viewer.rigs.scene import Scene
 
 _CURVE_BITS = 10  # bits per axis
 _split: Memo[Figure, tuple[Ints, Ints, Ints]] = Memo()

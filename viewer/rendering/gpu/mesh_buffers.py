@@ -22,18 +22,18 @@ from viewer.rendering.gpu.index_sets import (
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
 from viewer.rendering.gpu.upload import buffer, float32, pair_texture
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.topology import Shell, shell_of
-from viewer.rig.mesh import bounding_box, visible_vertices
-from viewer.rig.skin import (
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.topology import Shell, shell_of
+from viewer.rigs.mesh import bounding_box, visible_vertices
+from viewer.rigs.skin import (
     Skin,
     has_influence,
     joint_fractions,
     strongest_first,
     weight_sums,
 )
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rigs.skinning import Skinning, skin_used
 
 _MOST_VISIBLE = 64  # maximum number of combinations of hidden parts whose runs are cached
 

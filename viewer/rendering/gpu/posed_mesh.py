@@ -17,12 +17,12 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.surfaces import Surface
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.scalar_quantities import ScalarBuffer
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import palette_sizes, posed_skeleton
-from viewer.rig.pose import Pose
-from viewer.rig.shape import pose_weights, shaped
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import palette_sizes, posed_skeleton
+from viewer.rigs.pose import Pose
+from viewer.rigs.shape import pose_weights, shaped
+from viewer.rigs.skinning import Skinning
 
 _ALONE = np.zeros(1, np.intp)
 

@@ -24,11 +24,11 @@ from viewer.rendering.gpu.upload import (
     write_stacked,
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import are_rigid
-from viewer.rig.skin import bind_positions
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import are_rigid
+from viewer.rigs.skin import bind_positions
+from viewer.rigs.skinning import METHODS, Skinning
 
 _SAMPLERS = {"u_palette": 0, "u_pairs": 1, "u_rigid": 2, "u_places": 3}
 BYTES_PER_VERTEX = 24
@@ -146,7 +146,7 @@ class PosedVertices:
         if method.uses_matrices:
             write_stacked(self._texture("u_palette"), float32(matrices[..., :3, :]))
         if method.uses_quaternions:
-            from viewer.rig.skinning.dqs import split_palette
+            from viewer.rigs.skinning.dqs import split_palette
 
             binds = bind_positions(figure.require_skin()) - self.mesh.center
             flat = matrices.reshape(-1, 4, 4)

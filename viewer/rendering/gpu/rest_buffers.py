@@ -11,8 +11,8 @@ from viewer.rendering.gpu.corrective_sums import Request, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
 from viewer.rendering.gpu.program import RESTS_BINDING, Programs
 from viewer.rendering.gpu.upload import float32, reserved
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
 
 
 class RestBuffers:

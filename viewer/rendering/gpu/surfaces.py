@@ -13,9 +13,9 @@ from viewer.data_classes import dataclass
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import picture_texture
-from viewer.rig.arrays import Bytes
-from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Outline, Rim, Texture
-from viewer.rig.mesh import Mesh
+from viewer.rigs.arrays import Bytes
+from viewer.rigs.material import ALPHA_MODES, TEXTURES, Material, Outline, Rim, Texture
+from viewer.rigs.mesh import Mesh
 
 SAMPLERS = {
     "u_texture": 5,

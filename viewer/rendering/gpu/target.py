@@ -21,7 +21,7 @@ from viewer.rendering.gpu.context import check_errors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
-from viewer.rig.arrays import Bytes
+from viewer.rigs.arrays import Bytes
 
 _OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian number
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import RenderError
 from viewer.rendering.gpu.context import check_errors, is_software
-from viewer.rig.arrays import Bytes, Floats
+from viewer.rigs.arrays import Bytes, Floats
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 _Numbers: TypeAlias = NDArray[np.generic] | list[float]

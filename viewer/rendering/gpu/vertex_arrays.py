@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import moderngl
 
 from viewer.rendering.gpu.upload import checked, float32
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 Source: TypeAlias = tuple[Any, ...]
 """A buffer, its layout in moderngl's notation, and the names of its attributes."""

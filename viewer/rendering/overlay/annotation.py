@@ -16,8 +16,8 @@ from viewer.rendering.overlay.segments import Segments, SegmentStyle
 from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.projection import picture_scale, project, unproject
 from viewer.rendering.view import View
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.vectors import unit
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.vectors import unit
 
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default label colour, sRGB."""

@@ -14,15 +14,15 @@ from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
 from viewer.rendering.projection import picture_scale, project, project_segments
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import placement_matrix
-from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped_skeleton
-from viewer.rig.skeleton import Skeleton, joint_labels, shown_joints, shown_parents
-from viewer.rig.srgb import encode_srgb
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import placement_matrix
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import shaped_skeleton
+from viewer.rigs.skeleton import Skeleton, joint_labels, shown_joints, shown_parents
+from viewer.rigs.srgb import encode_srgb
 
 HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Colour of the selected joint, sRGB and opacity."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 
 _BATCH = 512  # number of labels whose positions are compared with the placed labels at once
 _CELL_SIDE = 0.5  # side length of a cell in gaps, unless this gives too many cells

@@ -17,12 +17,12 @@ from viewer.phrases import printable
 from viewer.rendering.colors import NOTHING
 from viewer.rendering.overlay.typeface import Typeface
 from viewer.rendering.scalar_look import TYPICAL, ScalarLook
-from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.memo import Memo
-from viewer.rig.mesh import triangle_areas
-from viewer.rig.number_text import short_number
-from viewer.rig.scalars import (
+from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import triangle_areas
+from viewer.rigs.number_text import short_number
+from viewer.rigs.scalars import (
     categories,
     find_quantity,
     menu_title,
@@ -31,7 +31,7 @@ from viewer.rig.scalars import (
     shown_unit,
     split_name,
 )
-from viewer.rig.skinning import Skinning
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
     from PIL import ImageDraw
@@ -101,7 +101,7 @@ class ColoredFigure:
     figure: Figure
     """A figure with a mesh."""
     numbers: Floats
-    """(V,). Result of ``viewer.rig.scalars.compute``."""
+    """(V,). Result of ``viewer.rigs.scalars.compute``."""
     look: ScalarLook
     """Colours for this figure."""
 

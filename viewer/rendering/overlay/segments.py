@@ -13,7 +13,7 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.vertex_arrays import InstanceRows
 from viewer.rendering.options import Color
 from viewer.rendering.view import View, set_model
-from viewer.rig.arrays import Floats
+from viewer.rigs.arrays import Floats
 
 HIDDEN = 0.4
 """Default opacity of segments behind a surface."""

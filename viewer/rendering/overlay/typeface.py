@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.rig.arrays import Bytes, Ints
+from viewer.rigs.arrays import Bytes, Ints
 
 if TYPE_CHECKING:
     from PIL import ImageDraw, ImageFont

@@ -18,7 +18,7 @@ from viewer.rendering.overlay.annotation import Annotation, leader_lines, letter
 from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle
 from viewer.rendering.overlay.typeface import Lettering, shelves
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints
 
 # Maximum size of the texture, pixels, which every OpenGL 3.3 driver supports.
 _TEXTURE_WIDTH, _TEXTURE_TALLEST = 2048, 4096

@@ -10,8 +10,8 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform, checked
 from viewer.rendering.pinhole import frustum_corners, picture_size
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.cameras import CameraImage, CameraView
+from viewer.rigs.arrays import Floats
+from viewer.rigs.captures.cameras import CameraImage, CameraView
 
 _UNIT = 0
 

@@ -16,8 +16,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.mesh_pass import MeshPass, draw_layer
 from viewer.rendering.view import View
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
 
 GHOST_COLOR = (0.10, 0.42, 0.85)
 """Default colour of ghosts, linear."""

@@ -14,9 +14,9 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import parse_color
 from viewer.rendering.view import View, set_model
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.vectors import Up
-from viewer.rig.mesh import box_size
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import box_size
 
 LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)

@@ -31,14 +31,14 @@ from viewer.rendering.passes.mesh_pass import (
     shading_of,
 )
 from viewer.rendering.view import View, set_lights
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import palette_sizes, skinning_matrices
-from viewer.rig.motion.instances import PoseTable, local_rotations, placements, worlds
-from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor
-from viewer.rig.shape import pose_weights, shaped
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import palette_sizes, skinning_matrices
+from viewer.rigs.motion.instances import PoseTable, local_rotations, placements, worlds
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import pose_weights, shaped
+from viewer.rigs.skinning import Skinning
 
 FEWEST = 8
 """Minimum number of actors to draw as instances; see ``instance_groups``."""

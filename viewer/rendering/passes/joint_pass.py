@@ -13,15 +13,15 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import BoneStyle, Color, DisplayOptions, bone_style, skeleton_opacity
 from viewer.rendering.view import View, in_front, set_lights, set_model
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.kinematics import posed_skeleton, world_matrices
-from viewer.rig.memo import NumberKey
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.shape import shaped_skeleton
-from viewer.rig.skeleton import Skeleton, shown_joints
-from viewer.rig.skinning import deform
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import posed_skeleton, world_matrices
+from viewer.rigs.memo import NumberKey
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.shape import shaped_skeleton
+from viewer.rigs.skeleton import Skeleton, shown_joints
+from viewer.rigs.skinning import deform
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.bones import BoneBuffers

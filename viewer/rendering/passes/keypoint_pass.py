@@ -9,13 +9,13 @@ from viewer.rendering.gpu.box_buffers import BoxBuffers
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass, draw_boxes
 from viewer.rendering.view import View, in_front
-from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.keypoints import posed_keypoints
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, pose_key
-from viewer.rig.skinning import Skinning
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.keypoints import posed_keypoints
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import Pose, pose_key
+from viewer.rigs.skinning import Skinning
 
 _CUBE_SIZE = 0.006  # half the side length of a cube, relative to the figure's size
 

@@ -18,7 +18,7 @@ from viewer.rendering.passes.background_pass import BackdropPass
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
 from viewer.rendering.view import View
-from viewer.rig.scene import Scene
+from viewer.rigs.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.mesh_buffers import MeshBuffers

@@ -16,7 +16,7 @@ from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints
 
 Prepare = Callable[[moderngl.Program, MeshRun], object]
 """Function that sets further uniforms of a program before a run is drawn."""

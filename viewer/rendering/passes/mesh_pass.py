@@ -20,11 +20,11 @@ from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
 from viewer.rendering.options import Color, DisplayOptions, Shading
 from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.transform import mean_scale
-from viewer.rig.material import TEXTURES, Outline
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.units import METRES
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.transform import mean_scale
+from viewer.rigs.material import TEXTURES, Outline
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.units import METRES
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""

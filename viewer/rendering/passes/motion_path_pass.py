@@ -13,12 +13,12 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import View, set_model
-from viewer.rig.arrays import Floats
-from viewer.rig.mesh import bounding_box
-from viewer.rig.motion.evaluation import still_pose
-from viewer.rig.motion.motion_paths import MotionPath, motion_path, segments
-from viewer.rig.pose import pose_key
-from viewer.rig.scene import Actor, Motion
+from viewer.rigs.arrays import Floats
+from viewer.rigs.mesh import bounding_box
+from viewer.rigs.motion.evaluation import still_pose
+from viewer.rigs.motion.motion_paths import MotionPath, motion_path, segments
+from viewer.rigs.pose import pose_key
+from viewer.rigs.scene import Actor, Motion
 
 _WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts

@@ -26,8 +26,8 @@ from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.view import View
 from viewer.rendering.visibility import has_points, placement_of, shows_mesh, shows_skeleton
-from viewer.rig.arrays import Floats
-from viewer.rig.scene import Actor, Scene
+from viewer.rigs.arrays import Floats
+from viewer.rigs.scene import Actor, Scene
 
 _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Outline colours of selected and hovered parts, sRGB."""

@@ -18,10 +18,10 @@ from viewer.rendering.gpu.upload import buffer, float32
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import OPACITIES, Color, DisplayOptions
 from viewer.rendering.view import View, set_lights, set_model
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.captures.points import PointLayout
-from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.scene import Actor
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.captures.points import PointLayout
+from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.scene import Actor
 
 RIGHT: Color = (0.75, 0.06, 0.05)
 LEFT: Color = (0.05, 0.20, 0.75)

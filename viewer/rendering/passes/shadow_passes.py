@@ -20,9 +20,9 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, light_axes, set_model
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.geometry.vectors import cross, unit
+from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.geometry.vectors import cross, unit
 
 # The key light's shadow map.
 _SIDES = 256, 2048  # minimum and maximum number of texels on each side of a shadow map

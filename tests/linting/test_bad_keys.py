@@ -1,0 +1,179 @@
+"""Faults of single joints and frames in keyframed and captured motions, and sound motions."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from linting.sound import FRAMES, RATE, legs, make_skeleton
+
+from viewer.linting import Finding, Subject, frozen, hinges, jitter, pops, stretch
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor
+
+K = np.arange(FRAMES)
+Change = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+CHECKS = (pops, frozen, hinges, stretch, jitter)
+
+
+def arm() -> Figure:
+    """Return the skeleton of an arm along x whose elbow bends about z."""
+    names = ("pelvis", "spine", "left_shoulder", "left_elbow", "left_wrist", "left_hand")
+    offsets = [[0, 1, 0], [0, 0.5, 0], [0.2, 0, 0], [0.3, 0, 0], [0.3, 0, 0], [0.1, 0, 0]]
+    return Figure("arm", skeleton=make_skeleton(names, [-1, 0, 1, 2, 3, 4], offsets), unit="m")
+
+
+def about_z(degrees: np.ndarray) -> np.ndarray:
+    """Return quaternions (F, 4) of rotations about z."""
+    half = 0.5 * np.radians(degrees)
+    return np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=-1)
+
+
+def waving() -> np.ndarray:
+    """Return bends of the elbow in degrees: 40 +- 30 within 2 s, up to 3.2 a frame."""
+    return 40.0 + 30.0 * np.sin(2.0 * np.pi * K / FRAMES)
+
+
+def linted(change: Change, is_captured: bool) -> list[Finding]:
+    """Check the waving arm, with changed bends (F,), local translations and scales (F, J, 3)."""
+    figure = arm()
+    skeleton, times = figure.skeleton, K / RATE
+    bends, moves = waving(), np.tile(skeleton.rest_translations, (FRAMES, 1, 1))
+    scales = np.ones(moves.shape)
+    change(bends, moves, scales)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    turns[:, 3] = about_z(bends)
+    if is_captured:
+        clip = SampledClip("x", Timing(RATE, K), turns, moves - skeleton.rest_translations)
+    else:
+        parts = (("rotation", turns), ("translation", moves), ("scale", scales))
+        channels = [
+            TransformChannel(joint, path, times, values[:, joint])
+            for path, values in parts
+            for joint in range(6)
+        ]
+        clip = TransformClip("x", tuple(channels), 0.0, float(times[-1]))
+    subject = Subject(Actor(figure, clip=clip))
+    return [found for check in CHECKS for found in check.check(subject)]
+
+
+def pop(degrees: float) -> Change:
+    def change(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+        bends[30] += degrees
+
+    return change
+
+
+def spike(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    moves[30, 0, 0] += 0.4
+
+
+def freeze(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends[27:39] = bends[26]
+
+
+def hyperextend(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends[20:30] = np.interp(K[20:30], [20, 25, 30], [70.0, -40.0, 50.0])
+
+
+def lengthen(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    moves[10:20, 4] *= 1.5
+
+
+def grow(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    scales[40:, 2] = 1.4
+
+
+def tremble(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends += np.random.default_rng(3).normal(0.0, 4.0, FRAMES)
+
+
+# Each with its code, its joints, some values and its frames (None: any).
+FAULTS = {
+    "pop of 50 degrees": (pop(50.0), "C020.rotation", [3], {"size": "50°"}, [30]),
+    "pop of 15 degrees": (pop(-15.0), "C020.rotation", [3], {"size": "15°"}, [30]),
+    "spike": (spike, "C020.position", [0], {"size": "400 mm"}, [30]),
+    "frozen": (freeze, "C021.frames", [], {"ranges": ["frames 27 to 38"]}, [*range(27, 39)]),
+    "hyperextended": (hyperextend, "C024.hinge", [3], {"angle": pytest.approx(40.0)}, None),
+    "stretched": (lengthen, "C022.bones", [4], {"ratio": "1.5"}, None),
+    "scaled": (grow, "C023.scales", [2], {"ratio": "1.4"}, [*range(39, 60)]),
+    "trembling": (tremble, "C014.rotation", [3], {"usual": "0.0°"}, None),
+}
+
+
+@pytest.mark.parametrize("is_captured", [False, True])
+@pytest.mark.parametrize("name", FAULTS)
+def test_fault_is_found_at_its_joint_and_frames(name, is_captured):
+    change, key, joints, values, frames = FAULTS[name]
+    if is_captured and name == "scaled":
+        pytest.skip("captures have no scales")
+    found = [one for one in linted(change, is_captured) if one.diagnostic.key == key]
+    (one,) = found
+    assert one.severity == "warning" and one.joints.tolist() == joints
+    shown = {**one.diagnostic.values, **{k: str(v) for k, v in one.diagnostic.texts.items()}}
+    for field, value in values.items():
+        assert one.diagnostic.values.get(field, shown[field]) == value or shown[field] == value
+    assert frames is None or sorted(one.frames.tolist()) == frames
+
+
+def nothing(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    pass
+
+
+def strike(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """A blow: 60 degrees within two frames, which stops at once."""
+    bends[:] = np.interp(K, [0, 30, 32, 59], [20.0, 10.0, 70.0, 72.0])
+
+
+def hold(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """A wave that slows down, rests for 12 frames, and speeds up again."""
+    eased = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 24), np.full(12, 0.5 * np.pi)])
+    eased = np.concatenate([eased, np.linspace(0.5 * np.pi, np.pi, 24)])
+    bends[:] = 20.0 + 40.0 * np.sin(eased)
+
+
+def flap(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """Three beats a second, up to 15 degrees a frame."""
+    bends[:] = 40.0 + 24.0 * np.sin(2.0 * np.pi * 3.0 * K / RATE)
+
+
+def straighten(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """An arm that is straight at times, to 8 degrees beyond."""
+    bends[:] = 36.0 + 44.0 * np.sin(2.0 * np.pi * K / FRAMES)
+
+
+def walk(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    moves[:, 0, 2] += 1.4 * K / RATE
+
+
+@pytest.mark.parametrize("is_captured", [False, True])
+@pytest.mark.parametrize("change", [nothing, strike, hold, flap, straighten, walk])
+def test_sound_motion_has_no_finding(change, is_captured):
+    assert linted(change, is_captured) == []
+
+
+@pytest.mark.parametrize("gap", [1, 15])
+def test_quick_swing_around_missing_frames_is_not_jitter(gap):
+    """4.1 swings a second of up to 40 degrees, around another bend after the gap than before."""
+    rows = np.arange(90)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (90, 6, 1))
+    turns[:, 3] = about_z(40.0 * np.sin(2.0 * np.pi * 4.1 * rows / RATE) + 120.0 * (rows > 44))
+    rows[45 : 45 + gap] = -1
+    actor = Actor(arm(), clip=SampledClip("x", Timing(RATE, rows), turns))
+    assert "C014.rotation" not in [one.diagnostic.key for one in jitter.check(Subject(actor))]
+
+
+def test_teleport_in_a_clip_of_keys_is_a_jump():
+    """The pelvis of legs, below a root that stays, is 0.2 m aside from frame 30 on."""
+    from viewer.linting import clips
+
+    figure = legs()
+    rest = figure.skeleton.rest_translations[0]
+    path = rest + np.where(K < 30, 0.0, 0.2)[:, None] * [1.0, 0.0, 0.0]
+    clip = TransformClip("x", (TransformChannel(0, "translation", K / RATE, path),), 0.0, 59 / RATE)
+    (found,) = clips.check(Subject(Actor(figure, clip=clip)))
+    assert found.diagnostic.key == "C003.joint" and found.frames.tolist() == [30]
+    # 0.2 m in 1/30 s; the limit is 5 times the size of 0.922 m per second.
+    assert "pelvis moves at 6 m/s" in found.message and "limit 4.61 m/s" in found.message

@@ -1,0 +1,386 @@
+"""Faults of weights, joints, bindings and sides in the bundled body, which has none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+import pytest
+from linting.sound import make_mesh, make_skeleton
+
+import viewer
+from viewer.linting import (
+    Finding,
+    Subject,
+    bindings,
+    blending,
+    hands,
+    joint_places,
+    spikes,
+    stray_weights,
+    symmetry,
+)
+from viewer.loading import bundled_body
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import axis_rotations
+from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.hierarchy import descendants
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor
+from viewer.rigs.shape import rest_joints
+from viewer.rigs.skin import normalized, owners, skin_from_entries, skin_from_lists, skin_rows
+
+CHECKS = (stray_weights, blending, bindings, joint_places, spikes, symmetry)
+
+
+@cache
+def body() -> Figure:
+    """Return the body without its symmetry map, as a file of another program has none."""
+    return replace(viewer.load(bundled_body()).actors[0].figure, symmetry=None)
+
+
+@cache
+def table() -> np.ndarray:
+    """Return the weights of the body: (V, J)."""
+    skin = normalized(body().skin)
+    weights = np.zeros((skin.n_vertices, skin.n_joints))
+    weights[owners(skin), skin.joints] = skin.weights
+    return weights
+
+
+def joint(name: str) -> int:
+    return body().skeleton.names.index(name)
+
+
+def below(name: str) -> np.ndarray:
+    """Return which joints move with a joint: (J,)."""
+    parents, found = body().skeleton.parents, np.arange(body().skeleton.n_joints) == joint(name)
+    for each in range(len(parents)):
+        found[each] |= parents[each] >= 0 and found[parents[each]]
+    return found
+
+
+def weighted(weights: np.ndarray, figure: Figure | None = None) -> Figure:
+    figure = figure or body()
+    vertices, joints = np.nonzero(weights)
+    values = weights[vertices, joints] / weights.sum(axis=1)[vertices]
+    skin = skin_from_entries(len(weights), vertices, joints, values, figure.skin.inverse_bind)
+    return replace(figure, skin=skin)
+
+
+def placed(figure: Figure, scale: float, up: str) -> Figure:
+    """Return a figure in another unit, with z up if requested."""
+    turn = np.eye(3)
+    if up == "z":
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    mesh, skin, skeleton = figure.mesh, figure.skin, figure.skeleton
+    binds = skin.inverse_bind.copy()
+    binds[:, :3, :3] = binds[:, :3, :3] @ turn.T
+    binds[:, :3, 3] *= scale
+    moved = scale * skeleton.rest_translations
+    moved[0] = moved[0] @ turn.T
+    rotations = skeleton.rest_rotations.copy()
+    if up == "z":
+        rotations[0] = np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)
+    return Figure(
+        figure.name,
+        Mesh(scale * mesh.positions @ turn.T, mesh.normals @ turn.T, mesh.triangles),
+        replace(skeleton, rest_translations=moved, rest_rotations=rotations),
+        replace(skin, inverse_bind=binds),
+        up=up,
+    )
+
+
+def linted(figure: Figure, checks: tuple[ModuleType, ...] = CHECKS) -> list[Finding]:
+    subject = Subject(Actor(figure), up=figure.up)
+    return [found for check in checks for found in check.check(subject)]
+
+
+# The head's vertex with the largest weight of the head.
+NOSE = 121
+
+
+def stray(fraction: float) -> Callable[[], Figure]:
+    def make() -> Figure:
+        weights = table().copy()
+        weights[NOSE] *= 1.0 - fraction
+        weights[NOSE, joint("right_foot")] += fraction
+        return weighted(weights)
+
+    return make
+
+
+def leak() -> Figure:
+    weights = table().copy()
+    on_head = np.flatnonzero(weights[:, joint("head")] > 0.5)
+    weights[on_head] *= 0.98
+    weights[on_head, joint("right_foot")] += 0.02
+    return weighted(weights)
+
+
+def swapped() -> Figure:
+    names = body().skeleton.names
+    legs = below("left_hip") | below("right_hip")
+    other = {"left": "right", "right": "left"}
+    partner = [
+        names.index(f"{other[name.split('_')[0]]}_{name.split('_')[1]}") if legs[k] else k
+        for k, name in enumerate(names)
+    ]
+    return weighted(table()[:, partner])
+
+
+def hard() -> Figure:
+    return weighted((table() == table().max(axis=1, keepdims=True)).astype(float))
+
+
+def hard_elbow() -> Figure:
+    weights, arm = table().copy(), [joint("left_shoulder"), joint("left_elbow")]
+    around = weights[:, arm].sum(axis=1) > 0.9
+    weights[around] = weights[around] == weights[around].max(axis=1, keepdims=True)
+    return weighted(weights)
+
+
+def noisy() -> Figure:
+    weights = table()
+    noise = np.random.default_rng(0).uniform(-0.2, 0.2, weights.shape) * (weights > 0.02)
+    return weighted(np.clip(weights + noise, 0.0, 1.0))
+
+
+def lopsided() -> Figure:
+    weights, wrist = table().copy(), below("left_elbow")
+    arm = weights[:, wrist].sum(axis=1) > 0.3
+    weights[arm, joint("left_shoulder")] += 0.3
+    return weighted(weights)
+
+
+def moved(*changes: tuple[str, list[float]]) -> Figure:
+    """Return the body with moved joints, whose bindings follow."""
+    figure = body()
+    binds, skeleton = figure.skin.inverse_bind.copy(), figure.skeleton
+    offsets = skeleton.rest_translations.copy()
+    for name, by in changes:
+        binds[joint(name), :3, 3] -= by
+        offsets[joint(name)] += by
+        offsets[skeleton.parents == joint(name)] -= by
+    skeleton = replace(skeleton, rest_translations=offsets)
+    return replace(figure, skeleton=skeleton, skin=replace(figure.skin, inverse_bind=binds))
+
+
+def renamed() -> Figure:
+    swap = {"left_knee": "right_knee", "right_knee": "left_knee"}
+    skeleton = body().skeleton
+    names = tuple(swap.get(name, name) for name in skeleton.names)
+    return replace(body(), skeleton=replace(skeleton, names=names))
+
+
+def limited() -> Figure:
+    skeleton = body().skeleton
+    limits = skeleton.dof_limits.copy()
+    limits[skeleton.dof_joints == joint("left_knee")] = [-0.5, 1.5]
+    return replace(body(), skeleton=replace(skeleton, dof_limits=limits))
+
+
+def turned() -> Figure:
+    """Return the body whose left knee is bound with a rotation of 30 degrees about z."""
+    binds = body().skin.inverse_bind.copy()
+    turn = np.eye(4)
+    turn[:3, :3] = axis_rotations(2, np.radians(-30.0))
+    binds[joint("left_knee")] = turn @ binds[joint("left_knee")]
+    return replace(body(), skin=replace(body().skin, inverse_bind=binds))
+
+
+def flattened() -> Figure:
+    """Return the body whose left elbow is at its shoulder."""
+    return moved(("left_elbow", list(-body().skeleton.rest_translations[joint("left_elbow")])))
+
+
+def spiked() -> Figure:
+    """Return the body with one vertex of its symmetric mesh 30 mm out of the surface."""
+    mesh = body().mesh
+    points = mesh.positions.copy()
+    points[NOSE] += 0.03 * mesh.normals[NOSE]
+    return replace(body(), mesh=replace(mesh, positions=points))
+
+
+def stuck_out() -> Figure:
+    """Return the body with one vertex 300 mm out of the surface."""
+    mesh = body().mesh
+    points = mesh.positions.copy()
+    points[NOSE] += 0.3 * mesh.normals[NOSE]
+    return replace(body(), mesh=replace(mesh, positions=points))
+
+
+CHECKED = {
+    ("W011", "W012", "W013"): stray_weights,
+    ("W014", "W015", "W016"): blending,
+    ("B",): bindings,
+    ("S",): joint_places,
+    ("M",): spikes,
+    ("Y",): symmetry,
+}
+LEG = ("hip", "knee", "ankle", "foot")
+FAULTS = {
+    "stray vertex": (stray(1.0), "W011.strays", ["right_foot"], [NOSE]),
+    "30 % stray": (stray(0.3), "W011.strays", ["right_foot"], [NOSE]),
+    "leak": (leak, "W011.strays", ["right_foot"], "head"),
+    "legs swapped": (
+        swapped, "W013.swapped", [f"{s}_{j}" for s in ("left", "right") for j in LEG], []
+    ),
+    "hard everywhere": (hard, "W015.everywhere", [], None),
+    "hard elbow": (hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None),
+    "noise": (noisy, "W016.noise", None, None),
+    "one arm differs": (lopsided, "Y002.joints", None, None),
+    "one elbow moved": (
+        lambda: moved(("left_elbow", [0.0, 0.1, 0.0])), "Y003.joints",
+        ["left_elbow", "right_elbow"], [],
+    ),
+    "bound with 30 degrees": (turned, "B007.rotations", ["left_knee"], []),
+    "elbow at the shoulder": (flattened, "S011.joints", ["left_elbow"], []),
+    "knees before the legs": (
+        lambda: moved(("left_knee", [0.0, 0.0, 0.2]), ("right_knee", [0.0, 0.0, 0.2])),
+        "S012.joints", ["left_knee", "right_knee"], [],
+    ),
+    "spike of 30 mm": (spiked, "M013.vertices", [], [NOSE]),
+    "spike of 300 mm": (stuck_out, "M013.vertices", [], [NOSE]),
+    "names swapped": (renamed, "Y004.names", ["left_knee", "right_knee"], []),
+    "limits of one knee": (limited, "Y005.limits", ["left_knee", "right_knee"], []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_fault_is_found_at_its_joints_and_vertices(name):
+    make, key, joints, vertices = FAULTS[name]
+    check = next(check for codes, check in CHECKED.items() if key.startswith(codes))
+    (found,) = [one for one in linted(make(), (check,)) if one.diagnostic.key == key]
+    assert found.severity == "warning"
+    if joints is not None:
+        names = body().skeleton.names
+        assert sorted(names[each] for each in found.joints) == sorted(joints)
+    if vertices == "head":
+        vertices = np.flatnonzero(table()[:, joint("head")] > 0.5).tolist()
+    assert vertices is None or sorted(found.vertices.tolist()) == vertices
+
+
+@pytest.mark.parametrize(("scale", "up"), [(0.01, "z")])
+def test_body_has_no_finding_in_other_axes(scale, up):
+    figure = placed(body(), scale, up)
+    assert linted(figure) == []
+    again = linted(placed(stray(0.3)(), scale, up), (stray_weights,))
+    assert [one.diagnostic.key for one in again] == ["W011.strays"]
+
+
+def test_joints_below_one_without_valid_data_are_not_compared():
+    """All joints of the arm are bound with 60 degrees, whose rotation at rest is invalid."""
+    figure, shoulder = body(), joint("left_shoulder")
+    turn = np.eye(4)
+    turn[:3, :3] = axis_rotations(2, np.radians(-60.0))
+    about = translation_matrix(rest_joints(figure)[shoulder])
+    arm = descendants(figure.skeleton.parents, shoulder)
+    binds = figure.skin.inverse_bind.copy()
+    binds[arm] = binds[arm] @ about @ turn @ np.linalg.inv(about)
+    actor = Actor(replace(figure, skin=replace(figure.skin, inverse_bind=binds)))
+    (found,) = [one for one in bindings.check(Subject(actor)) if one.code == "B007"]
+    assert sorted(found.joints) == np.flatnonzero(arm).tolist()
+    assert [*bindings.check(Subject(actor, invalid={"joints": np.array([shoulder])}))] == []
+
+
+def test_part_that_moves_with_a_distant_joint_is_found():
+    """A patch of the head, cut off, moves with a wrist, or with the head."""
+    patch = np.flatnonzero(
+        np.linalg.norm(body().mesh.positions - body().mesh.positions[NOSE], axis=1) < 0.03
+    )
+    mesh = body().mesh
+    inside = np.isin(mesh.triangles, patch)
+    kept = mesh.triangles[inside.all(axis=1) | ~inside.any(axis=1)]
+    cut = replace(body(), mesh=Mesh(mesh.positions, mesh.normals, kept))
+    island = np.unique(mesh.triangles[inside.all(axis=1)])
+    for name, expected in (("head", []), ("left_wrist", ["W012.islands"])):
+        weights = table().copy()
+        weights[island] = np.arange(weights.shape[1]) == joint(name)
+        found = linted(weighted(weights, cut), (stray_weights,))
+        assert [one.diagnostic.key for one in found] == expected
+        assert all(sorted(one.vertices.tolist()) == island.tolist() for one in found)
+
+
+def test_figure_on_its_head_is_upside_down():
+    """With y and z reversed, the head, 1.35 m above the ankles, is below them."""
+    figure, turn = body(), np.diag([1.0, -1.0, -1.0, 1.0])
+    skeleton, mesh = figure.skeleton, figure.mesh
+    offsets, rotations = skeleton.rest_translations.copy(), skeleton.rest_rotations.copy()
+    offsets[0] = turn[:3, :3] @ offsets[0]
+    rotations[0] = 1.0, 0.0, 0.0, 0.0
+    figure = Figure(
+        figure.name,
+        Mesh(mesh.positions @ turn[:3, :3], mesh.normals @ turn[:3, :3], mesh.triangles),
+        replace(skeleton, rest_translations=offsets, rest_rotations=rotations),
+        replace(figure.skin, inverse_bind=figure.skin.inverse_bind @ turn),
+        unit="m",
+    )
+    (found,) = linted(figure, (bindings, joint_places, spikes))
+    assert found.code == "S013" and "the head is 1.3" in found.message
+
+
+def test_animal_on_its_back_is_upside_down():
+    names = ("body", "head", "fore_foot_l", "fore_foot_r")
+    places = np.array([[0.0, 1, 0], [0.0, 1.2, 1], [0.3, 0, 0.5], [-0.3, 0, 0.5]])
+    for flip, expected in ((1.0, []), (-1.0, ["S013"])):
+        joints = places * [1.0, flip, 1.0]
+        binds = np.tile(np.eye(4), (4, 1, 1))
+        binds[:, :3, 3] = -joints
+        offsets = joints - [[0, 0, 0], *[joints[0]] * 3]
+        mesh = make_mesh(joints, [[0, 1, 2], [0, 2, 3]])
+        skin = skin_from_lists([[(k, 1.0)] for k in range(4)], binds)
+        figure = Figure("cat", mesh, make_skeleton(names, [-1, 0, 0, 0], offsets), skin, unit="m")
+        assert [one.code for one in linted(figure, (joint_places,))] == expected
+
+
+def apart(figure: Figure, vertices: np.ndarray) -> tuple[Figure, np.ndarray]:
+    """Return a figure whose triangles around some vertices use copies of them, and the copies."""
+    mesh, count = figure.mesh, figure.mesh.n_vertices
+    copies = count + np.arange(len(vertices))
+    triangles = mesh.triangles.copy()
+    number = np.arange(count)
+    number[vertices] = copies
+    above = mesh.positions[triangles].mean(axis=1)[:, 1] > mesh.positions[vertices, 1].mean()
+    triangles[above] = number[triangles[above]]
+    every = np.concatenate([np.arange(count), vertices])
+    split = Mesh(mesh.positions[every], mesh.normals[every], triangles)
+    skin = skin_rows(figure.skin, every)
+    return Figure(figure.name, split, figure.skeleton, skin), copies
+
+
+def test_seam_with_other_weights_on_one_side_is_torn():
+    """The triangles above a height have vertices of their own; some of these keep their weights."""
+    ring = np.flatnonzero(np.abs(body().mesh.positions[:, 1] - 0.2) < 0.1)
+    split, copies = apart(body(), ring)
+    assert linted(split, (blending,)) == []
+    weights = np.concatenate([table(), table()[ring]])
+    torn = copies[np.isin(copies, split.mesh.triangles)][::9]
+    weights[torn] = 0.7 * weights[torn]
+    weights[torn, joint("pelvis")] += 0.3
+    found = [one for one in linted(weighted(weights, split)) if one.code == "W014"]
+    (one,) = found
+    changed = torn[1.0 - weights[torn, joint("pelvis")] > 0.0]
+    assert set(one.vertices.tolist()) <= set(changed.tolist()) and len(one.vertices)
+
+
+@pytest.mark.parametrize(("frames", "expected"), [(0, []), (10, [*range(20, 30)])])
+def test_wrist_in_the_chest_is_found(frames, expected):
+    """The wrist is at the joint of the chest, or 25 cm in front of it, outside of the skin."""
+    figure = body()
+    rest = rest_joints(figure)
+    chest, wrist = joint("spine3"), joint("left_wrist")
+    held = rest[chest] + [0.0, 0.0, 0.25] - rest[joint("left_elbow")]
+    keys = np.tile(held, (60, 1))
+    keys[20 : 20 + frames] -= [0.0, 0.0, 0.25]
+    channel = TransformChannel(wrist, "translation", np.arange(60) / 30.0, keys)
+    actor = Actor(figure, clip=TransformClip("x", (channel,), 0.0, 59 / 30.0))
+    found = [*hands.check(Subject(actor))]
+    assert [one.joints.tolist() for one in found] == ([[wrist]] if frames else [])
+    numbers = [number for one in found for number in one.frames.tolist()]
+    # Between the samples before and after, the wrist passes the skin.
+    assert set(expected) <= set(numbers) <= {19, *expected, 30}
+    again = [*hands.check(Subject(actor, invalid={"normals": np.arange(3)}))]
+    assert [one.message for one in again] == [one.message for one in found]

@@ -1,0 +1,45 @@
+"""Jumps of the root that are slower than the limit of all joints."""
+
+import numpy as np
+import pytest
+from linting.sound import column
+
+from viewer.linting import LintOptions, lint_scene
+from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.scene import Actor, Scene
+
+RATE = 60  # at which clips of curves are checked; their frames are counted at 30 per second
+
+
+def jumps_of(places: np.ndarray, options: LintOptions | None = None) -> list[list[int]]:
+    """Return the frames of each reported jump of a column that moves through these places."""
+    figure = column()
+    times = np.arange(len(places)) / RATE
+    linear = (("linear", "linear"),)
+    channels = [
+        Channel(target, times, places if target == 0 else 0.0 * times, linear * len(times))
+        for target in range(figure.skeleton.n_dofs)
+    ]
+    clip = Clip("a", tuple(channels), 0.0, float(times[-1]))
+    found = lint_scene(Scene([Actor(figure, clip=clip)]), options)
+    return [finding.frames.tolist() for finding in found if finding.code == "C003"]
+
+
+# The skeleton is 2 units high: the limits are 30 for all joints, and 10 units per second for jumps.
+@pytest.mark.parametrize(("speed", "frames"), [(5.0, []), (20.0, [[10]]), (-20.0, [[10]])])
+def test_a_root_that_stands_before_and_after_a_fast_step_jumps(speed, frames):
+    assert jumps_of(np.where(np.arange(40) < 20, 0.0, speed / RATE)) == frames
+
+
+def test_a_root_that_keeps_moving_fast_does_not_jump():
+    assert jumps_of(20.0 / RATE * np.arange(40)) == []
+
+
+def test_repeated_frames_are_no_jumps():
+    assert jumps_of(20.0 / RATE * (np.arange(40) // 2)) == []
+
+
+def test_a_given_limit_replaces_that_of_jumps():
+    places = np.where(np.arange(40) < 20, 0.0, 20.0 / RATE)
+    assert jumps_of(places, LintOptions(max_speed=25.0)) == []
+    assert jumps_of(places, LintOptions(max_speed=15.0)) == [[10]]

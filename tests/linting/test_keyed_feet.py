@@ -1,0 +1,90 @@
+"""Feet in keyframed motions: what is style is a note, what cannot be style is a warning."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linting.sound import FRAMES, RATE, legs
+
+import viewer
+from viewer.linting import Finding, Subject, lint_scene
+from viewer.linting.feet import check as check_feet
+from viewer.loading import bundled_body
+from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
+from viewer.rigs.scene import Actor, Scene
+
+_K = np.arange(FRAMES)
+
+
+def moved(paths: dict[int, np.ndarray]) -> list[Finding]:
+    """Check legs whose joints are keyed in every frame, moved by (F, 3) from their rest places."""
+    figure = legs()
+    rest = figure.skeleton.rest_translations
+    channels = tuple(
+        TransformChannel(joint, "translation", _K / RATE, rest[joint] + path)
+        for joint, path in paths.items()
+    )
+    clip = TransformClip("keys", channels, 0.0, (FRAMES - 1) / RATE)
+    return [*check_feet(Subject(Actor(figure, clip=clip)))]
+
+
+def along(axis: int, values: np.ndarray) -> np.ndarray:
+    path = np.zeros((FRAMES, 3))
+    path[:, axis] = values
+    return path
+
+
+def serious(findings: list[Finding]) -> list[str]:
+    return [finding.code for finding in findings if finding.severity == "warning"]
+
+
+def test_body_that_skates_is_a_warning():
+    # 1.2 m in 2 s, with both feet on the ground.
+    assert serious(moved({0: along(2, 0.6 * _K / RATE)})) == ["C007"]
+
+
+def test_foot_shifted_under_a_body_that_stays_is_a_note():
+    (found,) = moved({3: along(2, 0.5 * _K / RATE)})
+    assert (found.code, found.severity) == ("C007", "note")
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.05])
+def test_body_that_stands_in_the_ground_is_a_warning(depth):
+    sunk = np.where((_K >= 20) & (_K < 40), -depth, 0.0)
+    assert serious(moved({0: along(1, sunk)})) == ["C008"]
+
+
+def test_foot_that_dips_while_it_moves_is_a_note():
+    # The lowest point, 40 mm or 4 % of the height, is passed at once.
+    dip = np.interp(_K, [20, 25, 30], [0.0, -0.04, 0.0])
+    (found,) = moved({3: along(1, dip)})
+    assert (found.code, found.severity) == ("C008", "note")
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.03, 0.1])
+def test_modelled_character_that_stands_in_the_ground_throughout_is_found(depth):
+    # Its height is 1.7 m; 30 mm are less than 3 %.
+    figure = viewer.load(bundled_body()).actors[0].figure
+    keys = np.tile(figure.skeleton.rest_translations[0] - [0.0, depth, 0.0], (2, 1))
+    channel = TransformChannel(0, "translation", [0.0, 2.0], keys)
+    actor = Actor(figure, clip=TransformClip("keys", (channel,), 0.0, 2.0))
+    found = [one for one in check_feet(Subject(actor)) if one.severity == "warning"]
+    expected = ["C008.throughout"] if depth == 0.1 else []
+    assert [one.diagnostic.key for one in found] == expected
+    assert all(one.diagnostic.values["depth"] == "100 mm" for one in found)
+
+
+def test_notes_about_several_animations_are_one_line():
+    """The figure plays two animations with a dip of one foot."""
+    figure = legs()
+    rest = figure.skeleton.rest_translations[3]
+    path = along(1, np.interp(_K, [20, 25, 30], [0.0, -0.04, 0.0]))
+    channel = TransformChannel(3, "translation", _K / RATE, rest + path)
+    clip = TransformClip("dip", (channel,), 0.0, (FRAMES - 1) / RATE)
+    names = ("walk", "run", "hop", "turn")
+    animations = tuple(Animation(name, clip.start, clip.end, lambda: clip) for name in names)
+    actor = Actor(replace(figure, animations=animations))
+    (found,) = [one for one in lint_scene(Scene([actor])) if one.code == "C008"]
+    assert found.motion == "walk, run, hop and 1 more"
+    assert found.message.endswith("; first of 4")
+    assert found.diagnostic.values["animations"] == list(names)

@@ -1,0 +1,109 @@
+"""Reports of findings: one line each for people and editors, all data for programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from viewer.diagnostics import SEVERITIES, Diagnostic, described
+from viewer.formats import folder_name
+from viewer.linting._finding import Finding
+from viewer.phrases import as_data, counted, printable
+from viewer.rigs.scene import Scene
+from viewer.rigs.skeleton import joint_labels
+
+_LISTED = 100  # maximum number of locations of a finding in JSON; the total is always included
+
+
+def worst_first(findings: Sequence[Finding]) -> list[Finding]:
+    """Return findings sorted by severity, worst first; stable within a severity."""
+    return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
+
+
+def finding_text(finding: Finding) -> str:
+    """Return one finding in the format of compilers, so that editors can jump to file and line."""
+    place, names = "", [finding.motion]
+    if finding.file is not None and finding.file != Path():
+        place = finding.place()
+        # The figure of a folder has the folder's name, but its findings name a file inside it.
+        folders = finding.file.parent.name, folder_name(finding.file.parent)
+        if finding.name not in (finding.file.stem, finding.file.name, *folders):
+            names = [finding.name, finding.motion]
+    elif finding.name:
+        place = printable(finding.name, 100)
+    who = "".join(f"{printable(name, 100)}: " for name in names if name)
+    head = f"{place}: " if place else ""
+    text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
+    return f"{head}{text}\n    {finding.title}; remedy: {finding.hint}"
+
+
+def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
+    """Return the numbers by severity: ``1 error, 0 warnings, 3 notes in 2 files``."""
+    counts = Counter(finding.severity for finding in findings)
+    parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]
+    return ", ".join(parts) + (f" in {counted(n_files, 'file')}" if n_files else "")
+
+
+@as_data()
+def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
+    """Return findings as data for JSON, worded as for the command line."""
+    counts = Counter(finding.severity for finding in findings)
+    return {
+        "findings": [_describe(finding, scene) for finding in findings],
+        "counts": {kind: counts[kind] for kind in reversed(SEVERITIES)},
+        "bodies": [
+            {
+                "name": printable(actor.name),
+                "model": actor.shape_space.model or None,
+                "gender": actor.shape_space.gender or None,
+            }
+            for actor in scene.actors
+            if actor.shape_space.title
+        ],
+    }
+
+
+def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
+    has_file = finding.file is not None and finding.file != Path()
+    facts: dict[str, Any] = {
+        "code": finding.code,
+        "severity": finding.severity,
+        "title": finding.title,
+        "message": printable(finding.message, 2000),
+        "hint": finding.hint,
+        "file": printable(finding.file, 1000) if has_file else None,
+        "line": finding.line,
+        "pointer": finding.pointer,
+        "actor": finding.actor,
+        "name": printable(finding.name),
+        "animation": printable(finding.motion) or None,
+        **_data(finding.diagnostic),
+    }
+    for key in ("vertices", "triangles", "joints", "frames", "times"):
+        values = getattr(finding, key)
+        facts[key] = values[:_LISTED].tolist()
+        facts[f"n_{key}"] = len(values)
+    facts["joint_names"] = _joint_names(finding, scene)
+    return facts
+
+
+def _data(found: Diagnostic) -> dict[str, Any]:
+    """Return a diagnostic's data except its code, severity, message and file location."""
+    data = described(found)
+    return {key: data[key] for key in ("key", "part", "places", "n_places", "count", "values")}
+
+
+def _joint_names(finding: Finding, scene: Scene) -> list[str]:
+    if finding.actor is None or len(finding.joints) == 0:
+        return []
+    figure = scene.actors[finding.actor].figure
+    if figure.points is not None:
+        names: tuple[str, ...] = figure.points.names
+    elif figure.skeleton is not None:
+        names = joint_labels(figure.skeleton)
+    else:
+        return []
+    some = finding.joints[:_LISTED].tolist()
+    return [printable(names[joint]) if joint < len(names) else f"#{joint}" for joint in some]

@@ -1,0 +1,107 @@
+"""Checks of bind matrices: invertibility, and agreement with the skeleton at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.linting._finding import Finding
+from viewer.linting._subject import Subject
+from viewer.phrases import counted, listed
+from viewer.rigs.arrays import Bools
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.inspection.faults import are_usable, bind_faults
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.shape import rest_joints
+from viewer.rigs.skeleton import Skeleton, joint_labels
+from viewer.rigs.skin import moves_vertices
+
+# Fraction of the figure's size: smaller differences are rounding errors of old files.
+_ELSEWHERE = 0.01
+_ASTRAY = np.radians(5.0)  # smallest rotation of a joint that is seen
+_SEVERAL = 8  # minimum number of joints that show what is usual
+_FEW = 0.25  # maximum fraction of joints that are exceptions
+
+
+def check(subject: Subject) -> Iterator[Finding]:
+    """Check the inverse bind matrices of a figure with a skin."""
+    figure = subject.actor.figure
+    if figure.skin is None or figure.skin.n_joints == 0:
+        return
+    yield from subject.faults(bind_faults(figure, subject.invalid))
+    usable = subject.valid("bindings", figure.skin.n_joints) & are_usable(figure.skin)
+    yield from _elsewhere(subject, figure, usable)
+    yield from _rotated(subject, figure, usable)
+
+
+def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
+    """Compare the joints' bind positions with those of the skeleton."""
+    skin, skeleton = figure.skin, figure.skeleton
+    if skin is None or figure.mesh is None or skeleton is None:
+        return
+    known = _placed(subject, skeleton) & usable
+    matrices = np.where(usable[:, None, None], skin.inverse_bind, np.eye(4))
+    bound = np.linalg.inv(matrices)[:, :3, 3]
+    own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
+    both = [np.linalg.norm(bound - joints, axis=1) for joints in (rest_joints(figure), own)]
+    distances = min((np.where(known, part, 0.0) for part in both), key=np.max)
+    away = np.flatnonzero(distances > _ELSEWHERE * subject.size())
+    if len(away) == 0:
+        return
+    away = away[np.argsort(-distances[away], kind="stable")]
+    first = int(away[0])
+    yield subject.found(
+        "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
+        "deformed at rest",
+        n=counted(
+            len(away), "joint", "has a bind pose that differs", "have bind poses that differ"
+        ),
+        joint=joint_labels(skeleton)[first],
+        distance=subject.length(float(distances[first])),
+        joints=away,
+        at=("bindings", first),
+    )
+
+
+def _placed(subject: Subject, skeleton: Skeleton) -> Bools:
+    """Return the joints whose place at rest is known: they and those above are valid: (J,)."""
+    known = subject.valid("joints", skeleton.n_joints)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        known[joint] &= parent < 0 or bool(known[parent])
+    return known
+
+
+def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
+    """Report single joints that rotate the mesh at rest, while most do not."""
+    skin, skeleton = figure.skin, figure.skeleton
+    if skin is None or skeleton is None or figure.mesh is None:
+        return
+    known = _placed(subject, skeleton) & usable
+    used = np.flatnonzero(moves_vertices(skin) & known)
+    if len(used) < _SEVERAL:
+        return
+    worlds = world_matrices(skeleton, rest_pose(skeleton))[used]
+    turns, _ = nearest_rotations((worlds @ skin.inverse_bind[used])[:, :3, :3])
+    # Angles between the rotations of all pairs, from trace(A^T B) = 1 + 2 cos; the pose of most
+    # joints is that of the mesh.
+    traces = np.einsum("iab,jab->ij", turns, turns)
+    angles = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    usual = int((angles < _ASTRAY).sum(axis=1).argmax())
+    off = np.flatnonzero(angles[usual] > _ASTRAY)
+    if len(off) == 0 or len(off) > _FEW * len(used):
+        return  # the mesh is bound in another pose: a note says so
+    off = off[np.argsort(-angles[usual][off], kind="stable")]
+    joints, labels = used[off], joint_labels(skeleton)
+    yield subject.found(
+        "B007.rotations: {n} bound with a rotation that differs from the rest pose: {names} "
+        "(worst: {joint} by {angle:.0f}°)",
+        n=counted(len(joints), "joint", "is", "are"),
+        names=listed([labels[joint] for joint in joints]),
+        joint=labels[joints[0]],
+        angle=float(np.degrees(angles[usual][off[0]])),
+        joints=joints,
+        at=("bindings", int(joints[0])),
+    )

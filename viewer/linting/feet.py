@@ -1,0 +1,329 @@
+"""Checks of a body's feet: sliding during ground contact, sinking into the ground, and floating."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.diagnostics import Phrase
+from viewer.linting._finding import Finding
+from viewer.linting._subject import Subject, Track, track_of
+from viewer.phrases import counted, listed, rounded
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.feet import limits
+from viewer.rigs.feet.contacts import (
+    foot_contacts,
+    ground_velocity,
+    half_window,
+    on_moving_ground,
+    slowest_points,
+)
+from viewer.rigs.feet.ground import Ground, ground_under, resting_frames
+from viewer.rigs.feet.soles import extent
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.skeleton import joint_labels
+
+# Keyframes are drawn by hand: feet that are shifted or roll below the ground are a matter of style.
+# What is reported as a warning there cannot be one: a body that skates, or stands in the ground.
+_ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
+_DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
+# Floors of whole motions, as fractions of the figure's height
+_BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
+_LOW_FLOOR, _OTHER_FLOOR = 0.06, 0.25  # depths between which the floor of a capture is too low
+_TOUCHING = 0.3  # minimum fraction of frames in which a foot is on the ground
+_HOPS = 0.8  # seconds; a hop or dodge takes less
+_RARELY = 0.1  # fraction of these frames in which the feet of a body that glides may be slow
+_CARRIED = 0.2  # minimum length of this path, as a fraction of the figure's height
+
+
+def check(subject: Subject) -> Iterator[Finding]:
+    """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
+    figure = subject.actor.figure
+    track = None if figure.skeleton is None else _moving(subject, figure)
+    if track is None or figure.skeleton is None or subject.options.ground == "none":
+        return
+    feet = track.feet.tolist()
+    if len(feet) < 2:
+        return
+    height, heights = extent(figure)[1], track.soles
+    given = subject.options.ground
+    ground, sinks = 0.0, limits.SINKS
+    if isinstance(given, float | int):
+        ground = float(given)
+    else:
+        step = float(track.times[1] - track.times[0])
+        found = ground_under(subject.actor, subject.up, heights, track.present, step)
+        if found.height is None:
+            yield _unsure(subject, found, step)
+            return
+        ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
+        yield from _sunk_throughout(subject, track, feet, ground, height)
+    labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
+    yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height, height)
+    yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
+    yield from _slipped(subject, track, feet, labels, heights - ground, height)
+
+
+def _moving(subject: Subject, figure: Figure) -> Track | None:
+    clip = subject.actor.clip
+    if clip is None or clip.end <= clip.start or subject.lacks("joints"):
+        return None
+    track = track_of(subject)
+    return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None
+
+
+def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
+    """Report that the ground is unknown, and feet were therefore not checked."""
+    if not found.levels:
+        return subject.found(
+            "C013.no-height: feet never rest long enough at one height: ground height unclear, "
+            "feet not checked",
+            part="clip",
+        )
+    levels = [
+        Phrase("{height} for {seconds} s", height=rounded(height), seconds=rounded(count * step, 2))
+        for height, count in found.levels
+    ]
+    return subject.found(
+        "C013.heights: feet rest at {n} ({levels}): ground height unclear, feet not checked",
+        n=counted(len(levels), "height"),
+        levels=listed(levels),
+        part="clip",
+    )
+
+
+def _sunk(
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    labels: list[str],
+    heights: Floats,
+    limit: float,
+    height: float,
+) -> Iterator[Finding]:
+    """Report feet that sink deeper than a limit in figure units."""
+    depths = np.where(track.present[:, None], -heights, 0.0)
+    deepest = depths.max(axis=1)
+    is_deep = np.pad(deepest > limit * track.scale, 1)
+    # A single frame may be noise, unless it is far too deep.
+    lasts = is_deep[1:-1] & (is_deep[:-2] | is_deep[2:])
+    frames = np.flatnonzero(lasts | (deepest > limits.FAR_TOO_DEEP * limit * track.scale))
+    if len(frames) == 0:
+        return
+    frames = frames[np.argsort(-deepest[frames], kind="stable")]
+    worst = int(depths[frames[0]].argmax())
+    is_serious = (
+        subject.actor.captured is not None
+        or bool(deepest[frames[0]] > _DEEP * height * track.scale)
+        or _stands_sunk(track, depths, limit, height)
+    )
+    each = track.of_each(frames)
+    yield subject.found(
+        "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=labels[worst],
+        depth=subject.length(float(deepest[frames[0]] / track.scale)),
+        frame=int(track.numbers[frames[0]]),
+        severity="warning" if is_serious else "note",
+        part="clip",
+        joints=[feet[worst]],
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", int(frames[0])),
+    )
+
+
+def _stands_sunk(track: Track, depths: Floats, limit: float, height: float) -> bool:
+    """Return whether a foot rests below a limit for as long as feet stand."""
+    step, size = float(track.times[1] - track.times[0]), track.scale * height
+    for foot in depths.T:
+        rests = resting_frames(-foot, track.present, step, size, limits.RESTS_FOR)
+        if (rests & (foot > limit * track.scale)).sum() * step >= limits.RESTS_FOR:
+            return True
+    return False
+
+
+def _sunk_throughout(
+    subject: Subject, track: Track, feet: list[int], ground: float, height: float
+) -> Iterator[Finding]:
+    """Report feet that stand below the ground in a whole motion, where the ground is known."""
+    # A modelled character stands at rest on the floor of its animations, or they have it at 0. A
+    # capture may have any floor, and stand well below 0 if its root counts from the hip; a floor
+    # a little below is a fault of its height.
+    figure = subject.actor.figure
+    row = subject.actor.placement["xyz".index(subject.up)]
+    sole = float(row["xyz".index(figure.up)] * extent(figure)[0] + row[3])
+    size = track.scale * height
+    is_modelled = subject.actor.captured is None and figure.is_attached
+    floor, least, most = (sole, _BELOW, np.inf) if is_modelled else (0.0, _LOW_FLOOR, _OTHER_FLOOR)
+    depth = min(floor, 0.0) - ground
+    if not least * size < depth < most * size:
+        return
+    yield subject.found(
+        "C008.throughout: feet rest {depth} below the ground in the whole motion",
+        depth=subject.length(depth / track.scale),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[:1],
+        times=track.times[:1],
+        at=("frames", 0),
+    )
+
+
+def _floating(
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    heights: Floats,
+    height: float,
+    may_step: bool,
+) -> Iterator[Finding]:
+    """Report a body whose lower foot rests above the ground; ``may_step``: by less than a step."""
+    lowest, size = heights.min(axis=1), track.scale * height
+    step = float(track.times[1] - track.times[0])
+    rests = resting_frames(lowest, track.present, step, size, limits.RESTS_FOR)
+    most = limits.STEPS * size if may_step else np.inf
+    frames = np.flatnonzero(rests & (lowest > limits.FLOATS * size) & (lowest < most))
+    if len(frames) == 0:
+        return
+    frames = frames[np.argsort(-lowest[frames], kind="stable")]
+    each = track.of_each(frames)
+    yield subject.found(
+        "C016.foot: {n}: both feet rest up to {height} above the ground, highest at frame {frame}",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        height=subject.length(float(lowest[frames[0]] / track.scale)),
+        frame=int(track.numbers[frames[0]]),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", int(frames[0])),
+    )
+
+
+def _slipped(
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    labels: list[str],
+    heights: Floats,
+    height: float,
+) -> Iterator[Finding]:
+    """Report a foot that slides along the ground, where feet do not stand."""
+    if track.body <= 0.0:  # legs without a length
+        return
+    step = float(track.times[1] - track.times[0])
+    paths = list(track.paths)
+    how = runs_of(track.present), 1.0 / step, track.body, axis_vector(subject.up)
+    velocity = ground_velocity(paths, *how)
+    if velocity is not None:  # a motion in place: standing feet move with the ground
+        paths = on_moving_ground(paths, (track.times[0] - track.times)[:, None] * velocity)
+    speeds = np.stack([slowest_points(path, *how) for path in paths], axis=1)
+    stands = np.zeros(speeds.shape, dtype=np.bool_)
+    for foot, contacts in enumerate(foot_contacts(paths, *how)):
+        for contact in contacts:
+            stands[contact.start : contact.stop, foot] = True
+    touches = (np.abs(heights) < limits.TOUCHES * track.body) & track.present[:, None]
+    # Speeds are averaged over a window, so a foot must touch the ground in all of it.
+    half, n_frames = half_window(1.0 / step) + 1, len(touches)
+    for foot in range(len(feet)):
+        for first, last in runs_of(touches[:, foot]):
+            touches[first : first + half * (first > 0), foot] = False
+            touches[max(last - half * (last < n_frames), 0) : last, foot] = False
+    slides = _sliding(speeds / track.body, touches & ~stands, stands, step)
+    # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
+    both = slides[1:] & slides[:-1]
+    distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
+    travels = _drifting(subject, track, feet, speeds / track.body, touches, height)
+    if not (distances > limits.FAR * track.body).any():
+        yield from travels
+        return
+    worst = int(distances.argmax())
+    is_carried = subject.actor.captured is not None or _is_carried(
+        track, worst, slides[:, worst], height
+    )
+    if not is_carried:
+        yield from travels
+    fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
+    each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
+    yield subject.found(
+        "C007.foot: {n}: {joint} slides by {distance} in total, at up to {speed} (frame {frame})",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=labels[worst],
+        distance=subject.length(float(distances[worst] / track.scale)),
+        speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
+        frame=int(track.numbers[fastest]),
+        severity="warning" if is_carried else "note",
+        part="clip",
+        joints=[feet[worst]],
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", fastest),
+    )
+
+
+def _drifting(
+    subject: Subject, track: Track, feet: list[int], speeds: Floats, touches: Bools, height: float
+) -> Iterator[Finding]:
+    """Report a body that travels while its feet walk at another speed, or in place."""
+    # A walker travels, and each foot stands for some time; or both feet pass the body on a ground
+    # that moves. If the body travels although no foot ever stands, it glides.
+    rows = np.flatnonzero(touches.any(axis=1))
+    there = np.flatnonzero(track.present)
+    seconds = float(track.times[there[-1]] - track.times[there[0]]) if len(there) else 0.0
+    if seconds < _HOPS or len(rows) < _TOUCHING * len(there):
+        return
+    slowest = np.where(touches, speeds, np.inf).min(axis=1)[rows]
+    path = np.mean([foot.hip for foot in track.paths], axis=0)
+    travel = (path[there[-1]] - path[there[0]]) @ (np.eye(3) - np.diag(axis_vector(subject.up)))
+    distance = float(np.linalg.norm(travel))
+    # Faster than any foot that slides, the body runs or flies.
+    speed = float(np.quantile(slowest, _RARELY))
+    if distance < _CARRIED * height * track.scale or not limits.FAST < speed < limits.SWINGS:
+        return
+    yield subject.found(
+        "C007.travel: the body travels {distance}, but no foot ever stands",
+        distance=subject.length(distance / track.scale),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[track.of_each(rows)],
+        times=track.times[track.of_each(rows)],
+        at=("frames", int(rows[0])),
+    )
+
+
+def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
+    """Return whether the hip moves along with a foot while it slides: the body skates."""
+    # Animators also shift a foot under a body that stays, and let feet of walks in place glide at
+    # speeds that vary. Of the foot's path, only what the hip does in the same steps counts.
+    both, path = slides[1:] & slides[:-1], track.paths[foot]
+    steps, hips = np.diff(path.heel, axis=0)[both], np.diff(path.hip, axis=0)[both]
+    lengths = np.linalg.norm(steps, axis=1)
+    carried = float((np.einsum("na,na->n", hips, steps) / np.maximum(lengths, 1e-30)).sum())
+    return carried > _ALONG * lengths.sum() and carried > _CARRIED * height * track.scale
+
+
+def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:
+    """Return the frames (F, N) in which low feet slide; ``speeds`` are body sizes per second."""
+    # A foot also swings close to the ground, but while another foot stands, and only after speeding
+    # up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
+    # no other foot stands. Starting and landing feet slide only for short times. A foot that stays
+    # low and moves for longer than any swing is dragged.
+    moves = low & (speeds > limits.FAST) & (speeds < limits.SWINGS)
+    result = np.zeros_like(moves)
+    for foot in range(moves.shape[1]):
+        is_alone = np.delete(stands, foot, axis=1).sum(axis=1) == 0
+        for first, last in runs_of(moves[:, foot]):
+            stood = bool(stands[max(first - 1, 0) : last + 1, foot].any())
+            drifts = stood and bool(speeds[first:last, foot].max() < limits.DRIFTS)
+            is_dragged = (last - first) * step > limits.DRAGS_FOR
+            result[first:last, foot] = is_alone[first:last] | drifts | is_dragged
+        for first, last in runs_of(result[:, foot]):
+            result[first:last, foot] = last - first >= max(1, round(limits.SLIDES_FOR / step))
+    return result

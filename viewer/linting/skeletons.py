@@ -1,0 +1,143 @@
+"""Checks of skeletons: names, roots, rest transforms, locked DOFs, and poses beyond limits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.linting._finding import Finding
+from viewer.linting._subject import Subject
+from viewer.phrases import agree, counted, listed, quoted, rounded
+from viewer.rigs.inspection.faults import UNIT_ROTATION
+from viewer.rigs.pose import Pose
+from viewer.rigs.posing.dof_text import beyond_text
+from viewer.rigs.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
+
+_ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
+
+
+def check(subject: Subject) -> Iterator[Finding]:
+    """Check the skeleton and the current pose of an actor."""
+    skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
+    if skeleton is None:
+        return
+    yield from _names(subject, skeleton)
+    yield from _rest(subject, skeleton)
+    yield from _limits(subject, skeleton, pose)
+
+
+def _names(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
+    counts = Counter(skeleton.names)
+    repeated = [j for j, name in enumerate(skeleton.names) if name and counts[name] > 1]
+    if repeated:
+        names = list(dict.fromkeys(skeleton.names[joint] for joint in repeated))
+        shown = [Phrase("{name} ({n})", name=quoted(name), n=counts[name]) for name in names]
+        yield subject.found(
+            "S006.joints: {n} with duplicate names: {names}",
+            n=counted(len(repeated), "joint"),
+            names=listed(shown),
+            part="skeleton",
+            joints=repeated,
+            at=("joints", repeated[0]),
+        )
+    nameless = [
+        joint for joint in shown_joints(skeleton).tolist() if not skeleton.names[joint].strip()
+    ]
+    if nameless:
+        yield subject.found(
+            "S007.joints: {n} no name (first: joint {joint})",
+            n=counted(len(nameless), "joint", "has", "have"),
+            joint=nameless[0],
+            # A format that needs no names leaves all of them out; single ones were forgotten.
+            severity="note" if len(nameless) == skeleton.n_joints else "warning",
+            part="skeleton",
+            joints=nameless,
+            at=("joints", nameless[0]),
+        )
+    roots = np.flatnonzero(skeleton.parents < 0)
+    if len(roots) > 1:
+        labels = joint_labels(skeleton)
+        yield subject.found(
+            "S008.roots: {n} joints have no parent: {names}",
+            n=len(roots),
+            names=listed([labels[joint] for joint in roots]),
+            part="skeleton",
+            joints=roots,
+            at=("joints", int(roots[1])),
+        )
+
+
+def _rest(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
+    labels = joint_labels(skeleton)
+    known = subject.valid("joints", skeleton.n_joints)
+    lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
+    odd = np.flatnonzero((np.abs(lengths - 1.0) > UNIT_ROTATION) & known)
+    if len(odd):
+        yield subject.found(
+            "S009.rotations: {n} not normalised (first: length {length} at {joint})",
+            n=counted(len(odd), "rest rotation", "is", "are"),
+            joint=labels[odd[0]],
+            length=rounded(float(lengths[odd[0]]), 4),
+            part="skeleton",
+            joints=odd,
+            at=("joints", int(odd[0])),
+        )
+    flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1) & known)
+    if len(flat):
+        x, y, z = skeleton.rest_scales[flat[0]].tolist()
+        yield subject.found(
+            "S010.scales: {n} not positive (first: {x:zg} {y:zg} {z:zg} at {joint})",
+            n=counted(len(flat), "rest scale", "is", "are"),
+            joint=labels[flat[0]],
+            x=x,
+            y=y,
+            z=z,
+            part="skeleton",
+            joints=flat,
+            at=("joints", int(flat[0])),
+        )
+
+
+def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator[Finding]:
+    facts = [fact for _, fact in subject.actor.figure.facts if isinstance(fact, Diagnostic)]
+    for fact in facts:
+        joints = [] if fact.places is None else fact.places.tolist()
+        at = ("joints", joints[0]) if joints else None
+        yield subject.found(
+            f"{fact.key}: {fact.sentence}",
+            part="skeleton",
+            joints=joints,
+            at=at,
+            **{**fact.values, **fact.texts},
+        )
+    low, high = skeleton.dof_limits.T
+    if pose is not None:
+        beyond = np.maximum(low - pose.dofs, pose.dofs - high)
+        outside = np.flatnonzero(beyond > _ROUNDING)
+        if len(outside):
+            outside = outside[np.argsort(-beyond[outside], kind="stable")]
+            worst = int(outside[0])
+            yield subject.found(
+                "S004.pose: {n} of the pose {are} limits: {dof}",
+                n=counted(len(outside), "DOF"),
+                dof=beyond_text(skeleton, worst, float(pose.dofs[worst])),
+                part="skeleton",
+                joints=np.unique(skeleton.dof_joints[outside]),
+                at=("joints", int(skeleton.dof_joints[worst])),
+                are=agree(len(outside), "is outside its", "are outside their"),
+            )
+    locked = np.flatnonzero(skeleton.locked)
+    if len(locked):
+        labels = dof_labels(skeleton)
+        yield subject.found(
+            "S005.dofs: {n} locked: {names}",
+            n=counted(len(locked), "DOF", "is", "are", of=skeleton.n_dofs),
+            all=skeleton.n_dofs,
+            names=listed([labels[dof] for dof in locked]),
+            part="skeleton",
+            joints=np.unique(skeleton.dof_joints[locked]),
+            at=("joints", int(skeleton.dof_joints[locked[0]])),
+        )

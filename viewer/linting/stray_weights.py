@@ -1,0 +1,230 @@
+"""Checks of weights for joints that are far away: stray weights, wrong islands, swapped sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.linting._finding import Finding
+from viewer.linting._subject import Indices, Subject
+from viewer.linting._surface import (
+    FEWEST,
+    LEAST,
+    Support,
+    Surface,
+    bone_distances,
+    support_of,
+    surface_of,
+)
+from viewer.phrases import agree, counted, listed, rounded
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.topology import components
+from viewer.rigs.inspection.faults import distinct
+from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.skin import bind_positions
+
+# A joint's reach is the distance from its bones to the farthest vertex that it mostly moves. On 40
+# rigs of artists, weights of 0.01 and more end within 0.12 sizes beyond it, and parts of the
+# surface that are apart from the rest of the joint's vertices begin within 0.06. Lengths are
+# fractions of the figure's size.
+_MOSTLY = 0.5  # fraction of a joint's largest weight
+_APART = 0.06  # maximum distance beyond the reach of a part that is apart
+_BEYOND = 0.16  # maximum distance beyond the reach of a vertex that is not
+_TWICE = 2.0  # maximum distance relative to the reach: weights of long bones end softly
+# Weights that fade out over single vertices hardly move them.
+_STRONG = 0.05  # smallest weight of a stray that is seen at once
+_MANY = 8  # number of vertices whose smaller weights are seen together
+_TOGETHER = 256  # vertices whose distances from others are computed together
+_NEAR = 0.02  # distance from the bones within which all parts are near
+_OTHER_LIMB = 0.03  # minimum distance of a joint from the middle of what it moves by mistake
+_NEARER = 0.35  # maximum distance from the bones of the right joint, relative to the wrong one
+
+
+def check(subject: Subject) -> Iterator[Finding]:
+    """Compare where joints have weights with where they are."""
+    figure = subject.actor.figure
+    size = subject.size()
+    if figure.skin is None or figure.mesh is None or not figure.is_attached or not size > 0.0:
+        return
+    if subject.lacks("weights", "positions", "bindings", "joints"):
+        return  # places and weights that are missing cannot be compared
+    found = support_of(figure)
+    if figure.mesh.n_vertices < FEWEST or len(found.vertices) == 0:
+        return
+    places, parents = bind_positions(figure.skin), figure.require_skeleton().parents
+    points = figure.mesh.positions[found.vertices]
+    swapped = _swapped(found, points, places, parents, size)
+    if len(swapped):
+        yield _swapped_finding(subject, figure, swapped)
+    distances = bone_distances(places, parents, points, found.joints) / size
+    largest, reach = np.zeros((2, figure.skin.n_joints))
+    np.maximum.at(largest, found.joints, found.weights)
+    mostly = found.weights >= _MOSTLY * largest[found.joints]
+    surface = surface_of(figure)
+    parts = components(len(found.places), found.links)[found.node]
+    is_minor = _are_minor(found, parts, distances)
+    # A vertex that is far away must not extend the reach by which it is judged.
+    own = np.flatnonzero(mostly & ~is_minor)
+    np.maximum.at(reach, found.joints[own], distances[own])
+    beyond = distances - reach[found.joints]
+    nearest = np.full(len(parts), np.inf)
+    np.minimum.at(nearest, parts, beyond)
+    stray = (nearest[parts] > _APART) & is_minor
+    stray &= _are_far(found, parts, points, np.flatnonzero(stray), own, _APART * size)
+    # A weight on much of the body is connected with the joint's own vertices, and outnumbers them.
+    leaks = (beyond > _BEYOND) & (distances > _TWICE * reach[found.joints])
+    n_far, n_own = (np.bincount(found.joints[k], minlength=len(reach)) for k in (leaks, mostly))
+    stray |= leaks & (n_far > n_own)[found.joints]
+    stray &= ~np.isin(found.joints, swapped) & ~_are_adjacent(found, parents)
+    if not stray.any():
+        return
+    whole = stray & _are_islands(surface, found, parts)
+    yield from _islands(subject, figure, found, np.flatnonzero(whole), distances)
+    yield from _strays(subject, figure, found, np.flatnonzero(stray & ~whole), distances)
+
+
+def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
+    """Return which influences are apart from their joint's own part of the surface: (N,)."""
+    # The own part is heavy and near: a large island on a small hand is not the hand.
+    nearest = np.full(len(parts), np.inf)
+    np.minimum.at(nearest, parts, distances)
+    score = np.bincount(parts, found.weights, minlength=len(parts)) / (nearest + _NEAR) ** 2
+    most = np.zeros(int(found.joints.max()) + 1)
+    np.maximum.at(most, found.joints, score[parts])
+    minor: Bools = score[parts] < most[found.joints]
+    return minor
+
+
+def _are_adjacent(found: Support, parents: Ints) -> Bools:
+    """Return which influences are of a parent or child of their vertex's strongest joint: (N,)."""
+    # The hair that moves with joints of its own keeps some weight of the head.
+    strongest = np.zeros(int(found.vertices.max()) + 1, dtype=np.int64)
+    order = np.argsort(found.weights, kind="stable")
+    strongest[found.vertices[order]] = found.joints[order]
+    main = strongest[found.vertices]
+    result: Bools = (parents[main] == found.joints) | (parents[found.joints] == main)
+    return result
+
+
+def _are_far(
+    found: Support,
+    parts: Indices,
+    points: Floats,
+    rows: Indices,
+    own: Indices,
+    least: float,
+) -> Bools:
+    """Return which parts, given by all their rows, are apart in space from ``own`` rows: (N,)."""
+    # The blade of a sword and the hem of a cape are parts far from their joint, but next to others
+    # that it moves.
+    far = np.zeros(len(parts), dtype=np.bool_)
+    if len(rows) == 0:
+        return far
+    joints = found.joints[own]
+    near = {joint: points[own[joints == joint]] for joint in np.unique(found.joints[rows]).tolist()}
+    rows = rows[np.argsort(parts[rows], kind="stable")]
+    for members in np.split(rows, np.flatnonzero(np.diff(parts[rows])) + 1):
+        others = near[int(found.joints[members[0]])]
+        gap = np.inf
+        for start in range(0, len(members), _TOGETHER):
+            some = points[members[start : start + _TOGETHER], None]
+            gap = min(gap, float(np.linalg.norm(some - others, axis=2).min(initial=gap)))
+        far[members] = gap > least
+    return far
+
+
+def _are_islands(surface: Surface, found: Support, parts: Indices) -> Bools:
+    """Return which influences are of a joint that moves a whole island of the mesh alone: (N,)."""
+    count = len(surface.place)
+    island = components(count, surface.edges)[surface.place]
+    n_places = np.bincount(island, minlength=count)
+    alone = found.weights > 1.0 - LEAST
+    own = np.bincount(parts, alone, minlength=len(parts))
+    result: Bools = own[parts] == n_places[island[found.vertices]]
+    return result
+
+
+def _islands(
+    subject: Subject, figure: Figure, found: Support, rows: Indices, distances: Floats
+) -> Iterator[Finding]:
+    if len(rows) == 0:
+        return
+    rows = rows[np.argsort(-distances[rows], kind="stable")]
+    vertices, first = found.vertices[rows], int(found.vertices[rows[0]])
+    joints = distinct(found.joints[rows])
+    yield subject.found(
+        "W012.islands: {n} of whole parts of the mesh {move} with {names}, {distance} away "
+        "(first: vertex {vertex})",
+        n=counted(len(vertices), "vertex"),
+        move=agree(len(vertices), "moves", "move"),
+        names=listed([joint_labels(figure.require_skeleton())[joint] for joint in joints]),
+        distance=subject.length(float(distances[rows[0]] * subject.size())),
+        vertex=first,
+        vertices=distinct(vertices),
+        joints=joints,
+        at=("weights", first),
+    )
+
+
+def _strays(
+    subject: Subject, figure: Figure, found: Support, rows: Indices, distances: Floats
+) -> Iterator[Finding]:
+    if len(rows) == 0:
+        return
+    moved = found.weights[rows] * distances[rows]
+    rows = rows[np.argsort(-moved, kind="stable")]
+    worst = int(rows[0])
+    vertices, joints = distinct(found.vertices[rows]), distinct(found.joints[rows])
+    labels = joint_labels(figure.require_skeleton())
+    is_seen = found.weights[rows].max() > _STRONG or len(vertices) >= _MANY
+    yield subject.found(
+        "W011.strays: {n} influenced by joints far away: {names} (worst: vertex {vertex}, by "
+        "{weight} of {joint}, {distance} away)",
+        n=counted(len(vertices), "vertex", "is", "are"),
+        names=listed([labels[joint] for joint in joints]),
+        vertex=int(found.vertices[worst]),
+        weight=rounded(float(found.weights[worst]), 2),
+        joint=labels[int(found.joints[worst])],
+        distance=subject.length(float(distances[worst] * subject.size())),
+        severity="warning" if is_seen else "note",
+        vertices=vertices,
+        joints=joints,
+        at=("weights", int(found.vertices[worst])),
+    )
+
+
+def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size: float) -> Indices:
+    """Return joints in pairs, each of which moves the vertices around the other: (N,)."""
+    count = len(places)
+    total = np.bincount(found.joints, found.weights, minlength=count)
+    sums = [
+        np.bincount(found.joints, found.weights * points[:, axis], minlength=count)
+        for axis in range(3)
+    ]
+    used = np.flatnonzero(total > 0.0)
+    middles = np.stack(sums, axis=1)[used] / total[used, None]
+    # Distance of the middle of each joint's vertices from the bones of every joint.
+    across = np.zeros((len(used), len(used)))
+    for column, joint in enumerate(used):
+        across[:, column] = bone_distances(places, parents, middles, np.full(len(used), joint))
+    own = np.diag(across)
+    elsewhere = (own[:, None] > _OTHER_LIMB * size) & (across < _NEARER * own[:, None])
+    first, second = np.nonzero(elsewhere & elsewhere.T)
+    # Of several joints there, the pair is the nearest one.
+    near = [int(across[one][second[first == one]].argmin()) for one in np.unique(first)]
+    pairs = {one: second[first == one][k] for one, k in zip(np.unique(first), near, strict=True)}
+    return used[[one for one, other in pairs.items() if pairs.get(other) == one]]
+
+
+def _swapped_finding(subject: Subject, figure: Figure, joints: Indices) -> Finding:
+    labels = joint_labels(figure.require_skeleton())
+    return subject.found(
+        "W013.swapped: weights of {n} are exchanged in pairs: {names}; each of a pair moves the "
+        "vertices around the other",
+        n=counted(len(joints), "joint"),
+        names=listed([labels[joint] for joint in joints]),
+        joints=joints,
+        at=("bindings", int(joints[0])),
+    )

@@ -1,0 +1,293 @@
+"""Contacts of the feet of a moving body with the ground: the one detector of this program.
+
+A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
+moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A contact
+is valid only if, at some time during it, the foot is the lowest one, not a foot held still in the
+air, and if it is below its hip, not next to it as in a lying person. The ground therefore need not
+be flat: every contact has its own height, as on stairs. The limits are those of ``limits``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.feet import limits
+from viewer.rigs.feet.curves import falling
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootPath:
+    """Path of a foot; that of a source is in the axes and the unit of the driven figure."""
+
+    toe: Floats
+    heel: Floats
+    """(N, 3). Positions of the ball and of a point below the ankle; equal if there is no ball."""
+    hip: Floats
+    """(N, 3). Positions of the hip."""
+
+    def lowest(self, up: Floats) -> Floats:
+        """Return the height of the lower of both points: (N,)."""
+        return np.minimum(self.toe @ up, self.heel @ up)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Contact of one foot with the ground."""
+
+    start: int
+    stop: int
+    """Half-open range of rows."""
+    on_toe: Bools
+    """(N,). Rows of the range in which the ball is on the ground; in all others, only the heel
+    is."""
+    is_flat: Bools
+    """(N,). Rows of the range in which both are on the ground."""
+    hold: Floats
+    """(N,). 1 in rows in which the foot is slow, less at the beginning and end of the contact."""
+    height: float
+    """Height of the foot's lower point."""
+    tilt: float
+    """Height of the heel above the ball."""
+
+
+def foot_contacts(
+    feet: Sequence[FootPath],
+    spans: Sequence[tuple[int, int]],
+    rate: float,
+    size: float,
+    up: Floats,
+    ease: float = 0.0,
+    slips: float = 1.0,
+) -> list[list[Contact]]:
+    """Return each foot's contacts in time order; ``spans`` are row ranges without gaps.
+
+    ``ease``: seconds over which the hold rises and falls; ``slips``: as ``limits.SLIPS``.
+    """
+    # For every foot and every span without gaps:
+    #   1. ball and heel separately: rows in which the point is low on the foot and slow (_stands);
+    #   2. a run of rows in which either stands is a candidate, so that a step that rolls from the
+    #      heel to the ball stays one contact;
+    #   3. a candidate is dropped if it is shorter than any step, or if the foot is never the
+    #      lowest;
+    #   4. its rows get a hold of 1 at speeds up to SLOW, falling smoothly to 0 at FAST: the planner
+    #      fixes the former and lets go of the latter.
+    lows = np.array([foot.lowest(up) for foot in feet])
+    result = []
+    for number, foot in enumerate(feet):
+        others = np.delete(lows, number, axis=0)
+        is_lowest = (lows[number] < others + limits.LOWEST * size).all(axis=0)
+        found = []
+        for first, last in spans:
+            part = slice(first, last)
+            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up, slips)
+            slow = (np.where(toe, *speeds) / size - limits.SLOW) / (limits.FAST - limits.SLOW)
+            hold = falling(slow)
+            for a, b in runs_of(toe | heel):
+                rows = slice(first + a, first + b)
+                if b - a < _shortest(rate) or not is_lowest[rows].any():
+                    continue
+                held = hold[a:b] * _eased(b - a, (a > 0, first + b < last), ease * rate)
+                one = _contact(foot, rows.start, (toe[a:b], heel[a:b]), hold[a:b], held, up)
+                found += [one] if one is not None else []
+        result.append(found)
+    return result
+
+
+def _contact(
+    foot: FootPath,
+    start: int,
+    stands: tuple[Bools, Bools],
+    hold: Floats,
+    eased: Floats,
+    up: Floats,
+) -> Contact | None:
+    """Return a contact without the loose rows at its ends; None if the person lies down."""
+    toe, heel = stands
+    slow = np.flatnonzero(hold >= 1.0) + start
+    legs = foot.hip[slow] - foot.heel[slow]
+    if np.median(legs @ up - limits.UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+        return None
+    height = float(np.median(foot.lowest(up)[slow]))
+    tilt = float(np.median((foot.heel[slow] - foot.toe[slow]) @ up))
+    firm = np.flatnonzero(hold > limits.LOOSE)
+    a, b = int(firm[0]), int(firm[-1]) + 1
+    on_toe, is_flat = toe[a:b], (toe & heel)[a:b]
+    return Contact(start + a, start + b, on_toe, is_flat, eased[a:b], height, tilt)
+
+
+def _eased(count: int, is_open: tuple[bool, bool], ease: float) -> Floats:
+    """Return factors that rise from the open start of a contact and fall to its open end: (N,)."""
+    span = min(round(ease), (count - 1) // 3) + 1.0
+    rows = np.minimum(np.arange(1.0, count + 1.0), span)
+    begin, end = (rows if is_one else np.full(count, span) for is_one in is_open)
+    return 1.0 - falling(np.minimum(begin, end[::-1]) / span)
+
+
+def _shortest(rate: float) -> int:
+    return max(2, round(limits.SHORTEST * rate))
+
+
+def _stands(
+    foot: FootPath,
+    part: slice,
+    lows: Floats,
+    rate: float,
+    size: float,
+    up: Floats,
+    slips: float,
+) -> tuple[list[Bools], list[Floats]]:
+    """Return the rows of a part in which the ball and the heel are in contact, and their speeds."""
+    found, paces = [], []
+    for points in (foot.toe[part], foot.heel[part]):
+        high = points @ up
+        above = high - lows[part]
+        # Speeds in a space whose horizontal axes are compressed, so that sliding counts less.
+        squeezed = points if slips == 1.0 else (points + (slips - 1.0) * high[:, None] * up) / slips
+        speeds = mean_speeds(squeezed, rate)
+        begins = (above < limits.LOW * size) & (speeds < limits.SLOW * size)
+        lasts = (above < limits.HIGH * size) & (speeds < limits.FAST * size)
+        stands = np.zeros(len(points), dtype=np.bool_)
+        for a, b in runs_of(lasts):
+            if b - a >= _shortest(rate) and begins[a:b].any():
+                stands[a:b] = True
+        found.append(stands)
+        paces.append(speeds)
+    return found, paces
+
+
+def ground_level(
+    contacts: Sequence[Sequence[Contact]], size: float, clearance: float
+) -> tuple[float, bool]:
+    """Return the height at which feet stand, and whether the ground is at height 0."""
+    # Contacts within LEVEL of one another are on the same floor. For each contact, count the rows
+    # of all contacts on its floor: the floor with most rows is where the person stands longest. A
+    # floor near height 0, where most files put the ground, wins with a third of that.
+    every = [contact for foot in contacts for contact in foot]
+    heights = np.array([contact.height for contact in every])
+    rows = np.array([contact.stop - contact.start for contact in every])
+    near = np.abs(heights[:, None] - heights) < limits.LEVEL * size
+    counts = near @ rows
+    is_usual = (heights > limits.ON_GROUND[0] * size) & (heights < limits.ON_GROUND[1] * size)
+    is_usual &= counts >= limits.SIMILAR * counts.max()
+    best = int(counts.argmax())
+    if is_usual.any():
+        best = int(np.where(is_usual, np.abs(heights - clearance), np.inf).argmin())
+    # The weighted median: the height at which half of the floor's rows are passed. Unlike the mean,
+    # it ignores a contact on tiptoe or on the edge of a step.
+    order = np.argsort(heights[near[best]])
+    passed = np.cumsum(rows[near[best]][order])
+    middle = int(np.searchsorted(passed, 0.5 * passed[-1]))
+    return float(heights[near[best]][order][middle]), bool(is_usual.any())
+
+
+def step_height(contact: Contact, level: float, size: float) -> float:
+    """Return the ground under a contact above ``level``; 0 for small steps and for tiptoe."""
+    height = contact.height - level
+    is_tiptoe = abs(contact.tilt) > limits.TILTED * size and abs(height) < limits.TIPTOE * size
+    return 0.0 if is_tiptoe or abs(height) < limits.LEVEL * size else height
+
+
+def half_window(rate: float, seconds: float = limits.WINDOW) -> int:
+    """Return the number of rows before and after a row over which its speed is averaged."""
+    return max(1, round(0.5 * seconds * rate))
+
+
+def mean_speeds(places: Floats, rate: float) -> Floats:
+    """Return speeds (N,) averaged over a window around each frame."""
+    half = half_window(rate)
+    frames = np.arange(len(places))
+    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
+    moved = np.linalg.norm(places[after] - places[before], axis=1)
+    return moved * rate / np.maximum(after - before, 1)
+
+
+def slowest_points(
+    foot: FootPath, spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+) -> Floats:
+    """Return each row's speed (N,) along the ground of the foot's slowest point on the ground."""
+    # A foot that rolls or turns about its ball or its heel does not slide, although the other end
+    # moves.
+    low, result = foot.lowest(up), np.zeros(len(foot.toe))
+    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
+    for first, last in spans:
+        part, found = slice(first, last), []
+        for points in (foot.toe[part], foot.heel[part]):
+            is_on = points @ up < low[part] + limits.HIGH * size
+            found.append(np.where(is_on, mean_speeds(points @ across, rate), np.inf))
+        result[part] = np.minimum(*found)
+    return result
+
+
+# Speed of the ground below motions in place, as on a treadmill or with the travel removed.
+#
+# Standing feet then move at a constant velocity while the body stays in place. Contacts are found
+# in the axes of the moving ground.
+
+_MOST = 500  # maximum number of candidates
+
+
+def ground_velocity(
+    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+) -> Floats | None:
+    """Return the velocity (3,) of a moving ground per second; None if it does not move."""
+    # The velocity that most rows of the lowest foot share, within GROUND_SAME: every one of up to
+    # 500 rows is a candidate, the one with most neighbours wins, and the median of its neighbours
+    # is the estimate. A mean over all rows would be biased by the swings, in which the lowest foot
+    # moves the other way.
+    for seconds in limits.GROUND_WINDOWS:
+        speeds, body = _speeds(feet, spans, rate, half_window(rate, seconds), up)
+        if not len(speeds):
+            return None
+        near = limits.GROUND_SAME * size
+        candidates = speeds[:: -(-len(speeds) // _MOST)]
+        counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
+        best = candidates[int(np.argmax(counts))]
+        is_alike = np.linalg.norm(speeds - best, axis=1) < near
+        velocity: Floats = np.median(speeds[is_alike], axis=0)
+        n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
+        speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
+        is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
+        is_usual = is_alike.mean() > limits.GROUND_USUAL
+        is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
+        if is_moving and is_usual:
+            return velocity
+    return None
+
+
+def _speeds(
+    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, half: int, up: Floats
+) -> tuple[Floats, Floats]:
+    """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
+    lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
+    found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for first, last in spans:
+        rows = np.arange(first + half, last - half, dtype=np.int32)
+        own = np.zeros((len(rows), 3))
+        for number, foot in enumerate(feet):
+            is_toe = (foot.toe @ up <= foot.heel @ up)[rows, None]
+            moved = np.where(is_toe, *(_velocities(p, rows, half) for p in (foot.toe, foot.heel)))
+            own = np.where((lowest[rows] == number)[:, None], moved, own)
+        found.append(own)
+        body.append(np.mean([_velocities(foot.hip, rows, half) for foot in feet], axis=0))
+    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
+    return rate * np.concatenate(found) @ across, rate * np.concatenate(body) @ across
+
+
+def _velocities(path: Floats, rows: Ints, half: int) -> Floats:
+    """Return the displacement per row around each row."""
+    return (path[rows + half] - path[rows - half]) / (2.0 * half)
+
+
+def on_moving_ground(feet: Sequence[FootPath], travel: Floats) -> list[FootPath]:
+    """Return the paths of the feet relative to the ground, moved by ``travel`` (N, 3)."""
+    result = []
+    for foot in feet:
+        toe = foot.toe + travel
+        heel = toe if foot.heel is foot.toe else foot.heel + travel
+        result.append(FootPath(toe, heel, foot.hip + travel))
+    return result

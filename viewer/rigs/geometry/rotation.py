@@ -1,0 +1,143 @@
+"""Conversions of rotations: matrices, Euler angles, rotation vectors, quaternions (x, y, z, w)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rigs.arrays import Floats
+
+_SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
+
+
+def axis_rotations(axis: int, angles: Floats) -> Floats:
+    """Return right-handed rotations (..., 3, 3) about one axis by angles (...), radians."""
+    cosines, sines = np.cos(angles), np.sin(angles)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    matrices = np.zeros((*np.shape(angles), 3, 3))
+    matrices[..., axis, axis] = 1.0
+    matrices[..., first, first] = matrices[..., second, second] = cosines
+    matrices[..., second, first] = sines
+    matrices[..., first, second] = -sines
+    return matrices
+
+
+def quaternion_to_matrix(quaternions: Floats) -> Floats:
+    """Return the matrices of quaternions of any length, R v = q v q* / |q|^2 (Shoemake 1985)."""
+    quaternions = np.asarray(quaternions, dtype=np.float64)
+    x, y, z, w = (quaternions[..., number] for number in range(4))
+    scale = 2.0 / (x * x + y * y + z * z + w * w)
+    matrices = np.empty((*x.shape, 3, 3))
+    matrices[..., 0, 0] = 1.0 - scale * (y * y + z * z)
+    matrices[..., 0, 1] = scale * (x * y - z * w)
+    matrices[..., 0, 2] = scale * (x * z + y * w)
+    matrices[..., 1, 0] = scale * (x * y + z * w)
+    matrices[..., 1, 1] = 1.0 - scale * (x * x + z * z)
+    matrices[..., 1, 2] = scale * (y * z - x * w)
+    matrices[..., 2, 0] = scale * (x * z - y * w)
+    matrices[..., 2, 1] = scale * (y * z + x * w)
+    matrices[..., 2, 2] = 1.0 - scale * (x * x + y * y)
+    return matrices
+
+
+def rotation_vector_to_matrix(vectors: Floats) -> Floats:
+    """Return R = I + a K + b K^2, K = [r]x (Rodrigues), of rotation vectors r in radians."""
+    vectors = np.asarray(vectors, dtype=np.float64)
+    squares = np.einsum("...a,...a->...", vectors, vectors)
+    angles = np.sqrt(squares)
+    is_small = squares < _SMALL
+    divisor = np.where(is_small, 1.0, angles)
+    first = np.where(is_small, 1.0 - squares / 6.0, np.sin(angles) / divisor)
+    # a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 are accurate at any angle t, whereas
+    # (1 - cos t) / t^2 suffers from cancellation near 0.
+    half = np.sin(0.5 * angles) / divisor
+    second = np.where(is_small, 0.5 - squares / 24.0, 2.0 * half * half)
+    cross = np.zeros((*squares.shape, 3, 3))
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    cross[..., 2, 1], cross[..., 0, 2], cross[..., 1, 0] = x, y, z
+    cross -= np.swapaxes(cross, -1, -2)
+    return np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
+
+
+def matrix_to_quaternion(matrices: Floats) -> Floats:
+    """Return the unit quaternions of rotation matrices (..., 3, 3), w >= 0 (Shepperd 1978)."""
+    m = np.asarray(matrices, dtype=np.float64)
+    diagonal = np.moveaxis(np.diagonal(m, axis1=-2, axis2=-1), -1, 0)
+    trace = diagonal.sum(axis=0)
+    # 4 x^2, 4 y^2, 4 z^2, 4 w^2. Dividing by the largest of them avoids cancellation.
+    squares = np.stack([1.0 + 2.0 * part - trace for part in diagonal] + [1.0 + trace], axis=-1)
+    xy, xz, yz = (
+        m[..., 1, 0] + m[..., 0, 1],
+        m[..., 2, 0] + m[..., 0, 2],
+        m[..., 2, 1] + m[..., 1, 2],
+    )
+    xw, yw, zw = (
+        m[..., 2, 1] - m[..., 1, 2],
+        m[..., 0, 2] - m[..., 2, 0],
+        m[..., 1, 0] - m[..., 0, 1],
+    )
+    products = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, xw], axis=-1),
+            np.stack([xy, squares[..., 1], yz, yw], axis=-1),
+            np.stack([xz, yz, squares[..., 2], zw], axis=-1),
+            np.stack([xw, yw, zw, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = squares.argmax(axis=-1)
+    rows = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    quaternions = rows / np.linalg.norm(rows, axis=-1, keepdims=True)
+    return np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions) + 0.0
+
+
+def matrix_to_rotation_vector(matrices: Floats) -> Floats:
+    """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi radians."""
+    quaternions = matrix_to_quaternion(matrices)
+    sines = np.linalg.norm(quaternions[..., :3], axis=-1)
+    # 2 atan2 is accurate at 0 and at pi, unlike 2 acos(w).
+    angles = 2.0 * np.arctan2(sines, quaternions[..., 3])
+    is_zero = sines == 0.0
+    factors = np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
+    return quaternions[..., :3] * factors[..., None]
+
+
+def matrix_to_euler(matrices: Floats) -> Floats:
+    """Return Euler angles (..., 3) about x, y and z with R = Rz Ry Rx, x applied first, radians.
+
+    x and z are from -pi to pi, y from -pi / 2 to pi / 2. In gimbal lock (y = +-90 degrees) x and z
+    rotate about the same axis, so only their sum or difference is determined. The angles returned
+    still reproduce R exactly.
+    """
+    m = np.asarray(matrices, dtype=np.float64)
+    z = np.arctan2(m[..., 1, 0], m[..., 0, 0])
+    sine, cosine = np.sin(z), np.cos(z)
+    # y and x are taken from Rz^T R, which is Ry Rx even if z is ill-conditioned.
+    y = np.arctan2(-m[..., 2, 0], cosine * m[..., 0, 0] + sine * m[..., 1, 0])
+    x = np.arctan2(
+        sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
+    )
+    return np.stack([x, y, z], axis=-1) + 0.0
+
+
+def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
+    """Return proper R and P of M = R P (polar decomposition); det P < 0 for reflections."""
+    # M = U S V^T yields R = U V^T, with the last column of U negated if that is a reflection.
+    left, _, right = np.linalg.svd(matrices)
+    signs = np.ones((*left.shape[:-2], 3))
+    signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
+    rotations = (left * signs[..., None, :]) @ right
+    return rotations, np.swapaxes(rotations, -1, -2) @ matrices
+
+
+def quarter_turn(up: str) -> Floats:
+    """Return the rotation vector about x from the other up axis, y or z, to ``up``."""
+    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
+
+
+def up_rotation(source: str, target: str) -> Floats:
+    """Return the rotation (3, 3) about x from one up axis to another, "y" or "z"; exact."""
+    if source == target:
+        return np.eye(3)
+    # Adding 0 replaces -0 by 0.
+    quarter = np.asarray(np.pi / 2 if target == "z" else -np.pi / 2)
+    return np.round(axis_rotations(0, quarter)) + 0.0

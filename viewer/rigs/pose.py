@@ -1,0 +1,280 @@
+"""Poses: DOFs, local transforms, shape weights and placement of one figure."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.constraints.evaluation import constrained_matrices
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.transform import affine_matrices
+from viewer.rigs.memo import Memo, NumberKey
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
+
+if TYPE_CHECKING:
+    from viewer.rigs.skin import Skin
+
+_orders: Memo[Skeleton, _AxisProducts] = Memo()
+_Indices = NDArray[np.intp]
+
+
+@dataclass(slots=True, eq=False)
+class Pose:
+    """The mutable state of one figure; arrays are changed in place."""
+
+    dofs: Floats
+    """(D,). Lengths or radians."""
+    translations: Floats
+    """(J, 3). Offsets from the skeleton's rest translations, which follow the figure's shape."""
+    rotations: Floats
+    scales: Floats
+    """(J, 4), (J, 3). Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale
+    factors."""
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    """(S,). Weights of the figure's blend shapes; missing trailing weights are treated as 0."""
+    figure_scale: float = 1.0
+    """Scale of the whole skinned figure about its origin, applied after skinning."""
+    figure_translation: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,). Translation of the whole skinned figure, applied after its scale."""
+    posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
+    """Cached matrices; up to date if they have the key of the current values."""
+    _key: NumberKey | None = field(default=None, init=False, repr=False)
+
+    @property
+    def skinning_key(self) -> NumberKey:
+        """Key of all values except the figure's placement, the same object until a value changes.
+
+        Poses with equal keys have the same joints and need no second skinning.
+        """
+        arrays = self.dofs, self.translations, self.rotations, self.scales, self.shape_weights
+        self._key = NumberKey(*arrays) if self._key is None else self._key.updated(*arrays)
+        return self._key
+
+    def copy(self) -> Pose:
+        """Return a pose that shares no array with this one."""
+        return Pose(
+            dofs=self.dofs.copy(),
+            translations=self.translations.copy(),
+            rotations=self.rotations.copy(),
+            scales=self.scales.copy(),
+            shape_weights=self.shape_weights.copy(),
+            figure_scale=self.figure_scale,
+            figure_translation=self.figure_translation.copy(),
+        )
+
+
+class PoseKey(NamedTuple):
+    """All values of a pose at one moment, to compare and to restore; see ``pose_of``."""
+
+    numbers: NumberKey
+    """The pose's ``skinning_key``."""
+    scale: float
+    """The pose's ``figure_scale``."""
+    translation: tuple[float, ...]
+    """The pose's ``figure_translation``."""
+
+
+def pose_key(pose: Pose) -> PoseKey:
+    """Return a key that identifies the pose. Nothing is copied unless a value has changed."""
+    return PoseKey(pose.skinning_key, pose.figure_scale, tuple(pose.figure_translation.tolist()))
+
+
+def pose_of(key: PoseKey) -> Pose:
+    """Return a new pose with the values of a key."""
+    numbers = key.numbers
+    return Pose(
+        dofs=numbers.array(0),
+        translations=numbers.array(1).reshape(-1, 3),
+        rotations=numbers.array(2).reshape(-1, 4),
+        scales=numbers.array(3).reshape(-1, 3),
+        shape_weights=numbers.array(4),
+        figure_scale=key.scale,
+        figure_translation=np.array(key.translation),
+    )
+
+
+def placement_matrix(pose: Pose) -> Floats:
+    """Return T(figure_translation) S(figure_scale): (4, 4), applied after skinning."""
+    return affine_matrices(pose.figure_scale * np.eye(3), pose.figure_translation)
+
+
+def rest_pose(skeleton: Skeleton) -> Pose:
+    """Return a new pose with the values stored in the file, clamped to the limits.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Provides the rest transforms and DOF values.
+
+    Returns
+    -------
+    Pose
+        Pose that shares no array with the skeleton.
+    """
+    return Pose(
+        dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
+        translations=np.zeros((skeleton.n_joints, 3)),
+        rotations=skeleton.rest_rotations.copy(),
+        scales=skeleton.rest_scales.copy(),
+    )
+
+
+def zero_pose(skeleton: Skeleton) -> Pose:
+    """Return the rest pose with all DOFs at 0."""
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    return pose
+
+
+def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Build L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale) of joints (J, 4, 4).
+
+    Joints with a constraint follow their source instead.
+    """
+    # The first row of a joint's DOFs is applied first: rows x, y, z give Rz Ry Rx (CSE169 course
+    # notes, "rotation about x first, then y, then z").
+    turns = joint_rotations(skeleton, pose)
+    return affine_matrices(
+        *local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
+    )
+
+
+def local_transforms(
+    skeleton: Skeleton, rotations: Floats, dofs: Floats, translations: Floats, scales: Floats
+) -> tuple[Floats, Floats]:
+    """Return linear parts (..., J, 3, 3) and places (..., J, 3), relative to parents."""
+    places = skeleton.rest_translations + joint_offsets(skeleton, dofs, translations)
+    if skeleton.constraints:
+        first = (np.moveaxis(part, -2, 0) for part in (places, scales))
+        turned = constrained_matrices(skeleton, np.moveaxis(rotations, -3, 0), *first)
+        rotations = np.moveaxis(turned, 0, -3)
+    return rotations * scales[..., None, :], places
+
+
+def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Floats:
+    """Return the joints' offsets from their rest translations, DOFs included: (..., J, 3)."""
+    shape = np.broadcast_shapes(translations.shape[:-2], dofs.shape[:-1])
+    offsets = np.broadcast_to(translations, (*shape, *translations.shape[-2:])).copy()
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
+    if len(moves):
+        # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
+        entries = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
+        first = np.moveaxis(offsets, (-2, -1), (0, 1))
+        np.add.at(first, entries, np.moveaxis(dofs[..., moves], -1, 0))
+    if skeleton.posing is not None:
+        offsets += skeleton.posing.translations(dofs)
+    return offsets
+
+
+def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return R(quaternion) R(DOFs) relative to parents (J, 3, 3), without constraints."""
+    return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
+
+
+def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
+    """Multiply each joint's rotation DOFs (..., D), first row first, to (..., J, 3, 3)."""
+    if skeleton.posing is not None:
+        return skeleton.posing.rotations(dofs)
+    return _order_of(skeleton).at(dofs)
+
+
+def _order_of(skeleton: Skeleton) -> _AxisProducts:
+    def order() -> _AxisProducts:
+        rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)
+        axes = skeleton.dof_kinds[rows] - FIRST_ROTATION
+        return axis_products(skeleton.n_joints, skeleton.dof_joints[rows], axes, rows)
+
+    return _orders.get(skeleton, None, order)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Factor:
+    """One rotation of each of N joints: R = C + cos(a) D + sin(a) E, nine entries row by row."""
+
+    joints: _Indices | None  # None for all joints in order
+    rows: _Indices
+    constant: Floats
+    cosines: Floats
+    sines: Floats
+
+    def at(self, dofs: Floats) -> Floats:
+        """Return the rotations at DOFs (..., D): (..., N, 3, 3)."""
+        angles = dofs[..., self.rows, None]
+        entries = np.cos(angles) * self.cosines
+        entries += self.constant
+        entries += np.sin(angles) * self.sines
+        return entries.reshape(*entries.shape[:-1], 3, 3)
+
+
+class _AxisProducts:
+    """Order in which the rotation DOFs of each joint are multiplied."""
+
+    def __init__(self, n_joints: int, factors: list[_Factor]) -> None:
+        self._n_joints, self._factors = n_joints, factors
+
+    def at(self, dofs: Floats) -> Floats:
+        """Return the products of rotation DOFs (..., D) as (..., J, 3, 3); identity without any."""
+        result: Floats | None = None
+        for factor in self._factors:
+            rotations = factor.at(dofs)
+            if factor.joints is None:
+                result = rotations if result is None else rotations @ result
+                continue
+            result = self._identities(dofs) if result is None else result
+            result[..., factor.joints, :, :] = rotations @ result[..., factor.joints, :, :]
+        return self._identities(dofs) if result is None else result
+
+    def _identities(self, dofs: Floats) -> Floats:
+        return np.broadcast_to(np.eye(3), (*dofs.shape[:-1], self._n_joints, 3, 3)).copy()
+
+
+def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: _Indices) -> _AxisProducts:
+    """Order rotations (N,) about ``axes`` 0 to 2 for multiplication, a joint's first row first."""
+    factors = []
+    for chosen in _by_rank(joints):
+        matrices = np.zeros((3, len(chosen), 9))  # constant, cosines, sines
+        number, axis = np.arange(len(chosen)), axes[chosen]
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        matrices[0, number, 4 * axis] = 1.0
+        matrices[1, number, 4 * first] = matrices[1, number, 4 * second] = 1.0
+        matrices[2, number, 3 * second + first] = 1.0
+        matrices[2, number, 3 * first + second] = -1.0
+        of_rank = joints[chosen].astype(np.intp)
+        every = np.array_equal(of_rank, np.arange(n_joints))
+        factors.append(_Factor(None if every else of_rank, rows[chosen], *matrices))
+    return _AxisProducts(n_joints, factors)
+
+
+def _by_rank(joints: Ints) -> list[_Indices]:
+    """Return the indices of the first entries of all joints, of the second entries, and so on."""
+    order = np.argsort(joints, kind="stable")
+    ordered = joints[order]
+    is_first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]
+    starts = np.maximum.accumulate(np.where(is_first, np.arange(len(ordered)), 0))
+    rank = np.arange(len(ordered)) - starts
+    return [order[rank == number] for number in range(int(rank.max(initial=-1)) + 1)]
+
+
+class PosedSkeleton:
+    """World (J, 4, 4) and skinning matrices of the pose ``key``, read-only, computed once."""
+
+    __slots__ = ("_palette", "_skin", "key", "skeleton", "world")
+
+    def __init__(self, skeleton: Skeleton, key: NumberKey, world: Floats) -> None:
+        self.skeleton, self.key, self.world = skeleton, key, world
+        world.flags.writeable = False
+        self._skin: Skin | None = None
+        self._palette: Floats = world
+
+    def palette(self, skin: Skin) -> Floats:
+        """Return the skinning matrices M[j] = W[j] inverse(B[j]), (J, 4, 4), read-only."""
+        if self._skin is not skin:
+            self._palette = self.world @ skin.inverse_bind
+            self._palette.flags.writeable = False
+            self._skin = skin
+        return self._palette

@@ -1,0 +1,436 @@
+"""Inverse kinematics: joint angles that move a joint to a target position, within the limits.
+
+Damped least squares (Wampler 1986; Nakamura and Hanafusa 1986): with the error e from the joint
+to its target and the Jacobian J of the joint's position with respect to the chain's rotation DOFs,
+
+    step = J^T (J J^T + lambda^2 I)^-1 e
+
+A step that does not reduce the error is rejected and the damping increased (Levenberg 1944). DOFs
+that a step would move beyond a limit stop there, and the others compensate.
+
+A drag (``Reaching``) begins each solution at the last one. Where the joint follows its target, that
+is the smallest rotation from pose to pose. Where it cannot, because of limits or length, the pose
+may have to swing to another side of what the limits forbid: then the rotation is bounded by the
+movement of the target, and goes on while the target rests.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import RigError
+from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import Pose
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
+
+_CLOSE = 1e-7  # error below which the target is reached, as a fraction of the chain's length
+_STILL = 1e-10  # step in radians below which the search ends
+_LARGEST_STEP = 0.5  # maximum step in radians for which the linearisation is accurate
+_BEND = 0.02  # angle in radians by which a straight chain is bent out of a singular pose
+_SADDLE = 1e-4  # curvature below which a bend brings the joint nearer, of the chain's length^2
+_LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 0.05, 1e3  # of the chain's length
+_APART = 1e-5  # step in radians of differences; their error is about its square
+
+# Limits of a drag. Rotation for movement is in radians for each chain's length that the target
+# moves: 5 degrees a centimetre for an arm of half a metre. A target that the joint follows may need
+# more: the elbow of such an arm bends by 5 degrees a centimetre at 54 degrees, and faster without
+# limit the straighter it is.
+_RATE = np.radians(5.0) * 50.0
+_MOST_NEEDED = 3.0  # what a target that is followed may need, relative to _RATE
+_RETURN = 0.2  # rotation towards the pose at the start that leaves the joint in place, of _RATE
+_GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
+_MARGIN = 1.25  # of what a step needs, which is known by its linearisation
+_DRAG_ROUNDS = 10  # maximum steps per call, which bounds the time of a frame
+_SLOW = 1e-3  # relative decrease of the error below which a drag has settled
+# Distance to the target from which a joint may be held by limits or a straight chain, and movement
+# of the target after which other poses are tried again, of the chain's length.
+_MISSED, _RETRY = 1e-4, 0.01
+# Range at full length in which the joint lags behind its target, so that it is never straight, of
+# the chain's length. A target within reach is missed by at most 1 / e of it.
+_SOFT = 0.0025
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """Result of a reach for a target."""
+
+    dofs: Floats
+    """(D,). DOFs of the whole skeleton; only rotations of the chain have changed."""
+    distance: float
+    """Remaining distance between the joint and its target, figure units."""
+    limited: Ints
+    """(N,) int32. DOFs of the chain that are at one of their limits."""
+    is_settled: bool = True
+    """Whether the joint is as near as it comes; otherwise it goes on if asked again."""
+
+
+def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
+    """Return the nearest ancestors (N,) with free rotations, at most ``length``, nearest first."""
+    rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
+    able = set(skeleton.dof_joints[rotates].tolist())
+    chain = [above for above in path_to_root(skeleton.parents, joint)[1:] if above in able]
+    return np.array(chain[:length], dtype=np.int32)
+
+
+def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
+    """Return the axis of each rotation DOF of a joint, (3,) in its parent's frame, by DOF row."""
+    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
+    after = quaternion_to_matrix(pose.rotations[joint])
+    axes = {}
+    for row in own[::-1]:  # the last row is applied last, so it is the outermost
+        kind = int(skeleton.dof_kinds[row]) - FIRST_ROTATION
+        axes[int(row)] = after[:, kind].copy()
+        after = after @ axis_rotations(kind, pose.dofs[row])
+    return axes
+
+
+def reach(
+    skeleton: Skeleton, pose: Pose, joint: int, target: Floats, length: int = 2, rounds: int = 60
+) -> Reach:
+    """Move a joint as near to a target (3,) as its chain allows, never farther than the pose.
+
+    A start outside its limits is clamped first. RigError if no joint above it can rotate.
+    """
+    return Reaching(skeleton, pose, joint, length).reach(target, rounds)
+
+
+class Position(Protocol):
+    """Position of a joint as a function of the rotation DOFs above it."""
+
+    def at(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return the position (3,) at DOFs (N,), and its derivatives (3, N) per radian."""
+        ...
+
+
+class ChainPosition:
+    """Position of a joint below a chain of joints that rotate about their axes."""
+
+    # The position is p = B_0 R_0 B_1 R_1 ... B_n, with the rotations R_i about coordinate axes k_i,
+    # outermost first, and constant affine maps B_i between them, which contain rest transforms,
+    # scales, and DOFs that stay. With P_i = B_0 R_0 ... B_i and the vector v_i = R_i B_(i+1) ...
+    # from there to the joint, dp/dq_i = P_i (k_i x v_i), in which P_i is its linear part.
+
+    def __init__(self, skeleton: Skeleton, pose: Pose, joint: int, rows: Ints) -> None:
+        chosen, order = set(rows.tolist()), []
+        path = path_to_root(skeleton.parents, joint)[::-1]
+        first = path.index(int(skeleton.dof_joints[rows].min()))
+        above = int(skeleton.parents[path[first]])
+        linear, offset = np.eye(3), np.zeros(3)
+        if above >= 0:
+            world = world_matrices(skeleton, pose)[above]
+            linear, offset = world[:3, :3], world[:3, 3]
+        maps = []
+        for each in path[first:]:
+            own = np.flatnonzero(skeleton.dof_joints == each)
+            place = skeleton.rest_translations[each] + pose.translations[each]
+            for row in own[skeleton.dof_kinds[own] < FIRST_ROTATION]:
+                place[skeleton.dof_kinds[row]] += pose.dofs[row]
+            offset = offset + linear @ place
+            linear = linear @ quaternion_to_matrix(pose.rotations[each])
+            for row in own[skeleton.dof_kinds[own] >= FIRST_ROTATION][::-1].tolist():
+                if row in chosen:
+                    maps.append((linear, offset))
+                    order.append(row)
+                    linear, offset = np.eye(3), np.zeros(3)
+                else:
+                    kind = int(skeleton.dof_kinds[row]) - FIRST_ROTATION
+                    linear = linear @ axis_rotations(kind, pose.dofs[row])
+            linear = linear * pose.scales[each]
+        self._end = offset
+        self._linear = np.stack([pair[0] for pair in maps])
+        self._offset = np.stack([pair[1] for pair in maps])
+        self._order = np.searchsorted(rows, order)
+        # K v = k x v, and R = I + sin K + (1 - cos) K^2 (Rodrigues).
+        axes = np.eye(3)[skeleton.dof_kinds[order] - FIRST_ROTATION]
+        self._cross = np.cross(axes[:, None], np.eye(3)).swapaxes(1, 2)
+        self._square = self._cross @ self._cross
+
+    def at(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return the position (3,) at DOFs (N,), and its derivatives (3, N) per radian."""
+        angles = values[self._order, None, None]
+        turns = np.eye(3) + np.sin(angles) * self._cross + (1.0 - np.cos(angles)) * self._square
+        count, vector = len(turns), self._end
+        vectors = np.empty((count, 3))
+        for place in range(count - 1, -1, -1):
+            vectors[place] = turns[place] @ vector
+            vector = self._linear[place] @ vectors[place] + self._offset[place]
+        steps = self._linear.copy()
+        inner = self._linear[1:]
+        steps[1:] = turns[:-1] @ inner
+        for place in range(1, count):
+            steps[place] = steps[place - 1] @ steps[place]
+        columns = (steps @ (self._cross @ vectors[:, :, None]))[:, :, 0]
+        jacobian = np.empty((3, count))
+        jacobian[:, self._order] = columns.T
+        return vector, jacobian
+
+
+class FigurePosition:
+    """Position of a joint of any skeleton: rules of a body model, constraints of joints above."""
+
+    def __init__(self, skeleton: Skeleton, pose: Pose, joint: int, rows: Ints) -> None:
+        self._skeleton, self._pose, self._joint, self._rows = skeleton, pose.copy(), joint, rows
+
+    def at(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return the position (3,) at DOFs (N,), and its derivatives (3, N), by differences."""
+        moved = [self._place(values + each) for each in _APART * np.eye(len(values))]
+        back = [self._place(values - each) for each in _APART * np.eye(len(values))]
+        return self._place(values), (np.array(moved) - back).T / (2.0 * _APART)
+
+    def _place(self, values: Floats) -> Floats:
+        self._pose.dofs[self._rows] = values
+        return world_matrices(self._skeleton, self._pose)[self._joint, :3, 3]
+
+
+def position_of(skeleton: Skeleton, pose: Pose, joint: int, rows: Ints) -> Position:
+    """Return the position of a joint as a function of the rotation DOFs ``rows`` above it."""
+    constrained = {each.joint for each in skeleton.constraints}
+    is_plain = skeleton.posing is None and constrained.isdisjoint(
+        path_to_root(skeleton.parents, joint)
+    )
+    kind = ChainPosition if is_plain else FigurePosition
+    return kind(skeleton, pose, joint, rows)
+
+
+class Reaching:
+    """A joint that reaches for targets, each from the pose in which it reached for the last one.
+
+    RigError if no joint above it can rotate.
+    """
+
+    def __init__(self, skeleton: Skeleton, pose: Pose, joint: int, length: int = 2) -> None:
+        chain = chain_above(skeleton, joint, length)
+        if not len(chain):
+            raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
+        rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
+        self._rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
+        start = pose.copy()
+        self._dofs = start.dofs
+        self._low, self._high = skeleton.dof_limits[self._rows].T
+        self._dofs[self._rows] = np.clip(self._dofs[self._rows], self._low, self._high)
+        position = position_of(skeleton, start, joint, self._rows)
+        self._first = _State(position, self._dofs[self._rows])
+        self._goal = self._first
+        pivots = world_matrices(skeleton, start)[[joint, *chain], :3, 3]
+        # The chain cannot be longer than the distances between its joints.
+        self._base = pivots[-1]
+        self._size = float(np.linalg.norm(np.diff(pivots, axis=0), axis=1).sum()) or 1.0
+        # The first target is the joint itself: the range ends there, so that the drag begins in
+        # the pose that it finds.
+        room = self._size - float(np.linalg.norm(self._first.place - self._base))
+        self._soft = float(np.clip(room, 0.0, _SOFT * self._size))
+        self._target = self._wanted = self._first.place
+        self._damping = _FIRST_DAMPING
+        self._since_held = np.inf  # movement of the target since, of the chain's length
+
+    def reach(self, target: Floats, rounds: int = 60) -> Reach:
+        """Move the joint as near to a target (3,) as its chain allows, however far it rotates."""
+        self._target = np.asarray(target, dtype=np.float64)
+        self._wanted = self._within(self._target, 0.0)
+        goal = self._nearest(self._goal, rounds, 0.0)[0]
+        # A pose that limits hold may be left from one in the middle of them.
+        middle = self._goal.values.copy()
+        both = np.isfinite(self._low) & np.isfinite(self._high)
+        middle[both] = 0.5 * (self._low[both] + self._high[both])
+        for other in (self._bent(goal), self._goal.at(middle)):
+            if other is not None and self._left(goal) > _MISSED * self._size:
+                other = self._nearest(other, rounds, 0.0)[0]
+                goal = other if self._left(other) < self._left(goal) else goal
+        self._goal = goal
+        return self._result(self._goal, True)
+
+    def follow(self, target: Floats) -> Reach:
+        """Rotate the chain towards a target (3,), at most as far as the target's movement needs."""
+        target = np.asarray(target, dtype=np.float64)
+        wanted = self._within(target, self._soft)
+        moved = float(np.linalg.norm(target - self._target)) / self._size
+        most = _GLIDE
+        if moved > 0.0:
+            needed = self._step(self._goal, wanted - self._wanted, _LEAST_DAMPING)
+            needs = float(np.abs(needed).max()) / (_RATE * moved)
+            most = _RATE * moved * min(max(1.0, _MARGIN * needs), _MOST_NEEDED)
+        self._target, self._wanted = target, wanted
+        goal = self._returned(self._goal, _RETURN * _RATE * moved)
+        goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
+        self._since_held += moved
+        is_held = is_settled and self._left(goal) > _MISSED * self._size
+        if is_held and self._since_held >= _RETRY:
+            self._since_held = 0.0
+            goal, is_settled = self._freed(goal)
+        self._goal = goal
+        return self._shown(most, is_settled)
+
+    def _shown(self, most: float, is_settled: bool) -> Reach:
+        """Rotate the shown pose towards the goal, by at most ``most`` about each axis."""
+        # The goal may be on the other side of what the limits forbid. If possible, the joint stays
+        # at the target on the way there.
+        shown = self._dofs[self._rows]
+        way = self._goal.values - shown
+        part = most / max(float(np.abs(way).max()), 1e-300)
+        if part >= 1.0:
+            return self._result(self._goal, is_settled)
+        direct = self._goal.at(shown + part * way)
+        step = self._step(direct, self._wanted - direct.place, _FIRST_DAMPING)
+        near = self._goal.at(np.clip(direct.values + step, shown - most, shown + most))
+        come = np.linalg.norm(way) - np.linalg.norm(self._goal.values - near.values)
+        is_on_way = come > 0.5 * part * np.linalg.norm(way)
+        is_better = is_on_way and self._left(near) < self._left(direct)
+        return self._result(near if is_better else direct, False)
+
+    def _within(self, target: Floats, soft: float) -> Floats:
+        """Return a target (3,) moved to where the chain can reach it, on the line to its base."""
+        # Soft IK: beyond d_0 = L - s the distance d becomes d_0 + s (1 - exp(-(d - d_0) / s)),
+        # which continues with slope 1 and approaches the length L. For s = 0 it ends at L.
+        away = target - self._base
+        distance = float(np.linalg.norm(away))
+        nearest = self._size - soft
+        if distance <= nearest:
+            return target
+        if soft > 0.0:
+            nearest += soft * (1.0 - float(np.exp(-(distance - nearest) / soft)))
+        return self._base + nearest * unit(away)
+
+    def _result(self, state: _State, is_settled: bool) -> Reach:
+        self._dofs[self._rows] = state.values
+        at_limit = (state.values <= self._low) | (state.values >= self._high)
+        distance = float(np.linalg.norm(self._target - state.place))
+        return Reach(self._dofs.copy(), distance, self._rows[at_limit], is_settled)
+
+    def _left(self, state: _State) -> float:
+        """Return the distance to the target that is solved for."""
+        return float(np.linalg.norm(self._wanted - state.place))
+
+    def _nearest(self, state: _State, rounds: int, slow: float) -> tuple[_State, bool]:
+        """Return the state whose joint is nearest to the target, and whether the search ended.
+
+        It also ends where the distance decreases by less than ``slow`` of itself.
+        """
+        for _ in range(rounds):
+            distance = self._left(state)
+            if distance <= _CLOSE * self._size:
+                return state, True
+            better = self._improved(state, slow)
+            if better is None:
+                return state, True
+            state = better
+            if distance - self._left(state) < slow * distance:
+                return state, True
+        return state, False
+
+    def _improved(self, state: _State, slow: float = 0.0) -> _State | None:
+        """Return the state after one step that reduces the error; None if there is none."""
+        error, distance = self._wanted - state.place, self._left(state)
+        while self._damping <= _MOST_DAMPING:
+            step = self._step(state, error, self._damping)
+            promised = float(error @ (state.jacobian @ step))
+            if np.abs(step).max() < _STILL or promised < slow * distance**2:
+                break
+            better = state.at(state.values + step)
+            if self._left(better) < distance:
+                self._damping = max(0.3 * self._damping, _LEAST_DAMPING)
+                return better
+            self._damping *= 4.0
+        self._damping = _FIRST_DAMPING
+        return None
+
+    def _step(
+        self, state: _State, error: Floats, damping: float, wish: Floats | None = None
+    ) -> Floats:
+        """Return the damped step nearest to a wish (N,), or to none; DOFs stop at their limits."""
+        start, jacobian = state.values, state.jacobian
+        wish = np.zeros(len(start)) if wish is None else wish
+        step = wish.copy()
+        free: Bools = np.ones(len(start), dtype=bool)
+        damp = (damping * self._size) ** 2 * np.eye(3)
+        for _ in range(len(start)):
+            # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs.
+            part = jacobian[:, free]
+            left = error - jacobian[:, ~free] @ step[~free] - part @ wish[free]
+            step[free] = wish[free] + part.T @ np.linalg.solve(part @ part.T + damp, left)
+            step[free] *= min(1.0, _LARGEST_STEP / max(np.abs(step[free]).max(initial=0), 1e-300))
+            bounded = np.clip(start + step, self._low, self._high) - start
+            stopped = free & (bounded != step) & (np.abs(bounded - step) > _STILL)
+            if not stopped.any():
+                return bounded
+            step[stopped] = bounded[stopped]
+            free &= ~stopped
+            if not free.any():
+                break
+        return np.clip(start + step, self._low, self._high) - start
+
+    def _returned(self, state: _State, most: float) -> _State:
+        """Return a state nearer to the pose at the start, if that leaves the joint in place.
+
+        Steps by the pseudoinverse alone end in another pose after each loop of the target (Klein
+        and Huang 1983), so that a limb would twist during long drags.
+        """
+        wish = np.clip(self._first.values - state.values, -most, most)
+        if not wish.any():
+            return state
+        nearer = state.at(state.values + self._step(state, np.zeros(3), self._damping, wish))
+        return nearer if self._left(nearer) <= self._left(state) else state
+
+    def _freed(self, state: _State) -> tuple[_State, bool]:
+        """Return a nearer state than one that is held, and whether the search for it ended."""
+        # It is bent, or found from the start of the drag.
+        bent = self._bent(state)
+        if bent is not None:
+            return self._nearest(bent, _DRAG_ROUNDS, _SLOW)
+        other, is_settled = self._nearest(self._first, _DRAG_ROUNDS, _SLOW)
+        if self._left(other) < self._left(state) - _RETRY * self._size:
+            return other, is_settled
+        return state, True
+
+    def _bent(self, state: _State) -> _State | None:
+        """Return a state nearer than one that no small rotation improves, such as a straight one.
+
+        None if there is none.
+        """
+        if self._left(state) <= _CLOSE * self._size:
+            return None
+        # The gradient of |e|^2 / 2, -J^T e, is zero there, up to DOFs pressed against limits. The
+        # chain can still come nearer if the second derivative, H = J^T J - e . d^2p/dq^2, is
+        # negative along a direction: an eigenvector with a negative eigenvalue.
+        error, values = self._wanted - state.place, state.values
+        push = error @ state.jacobian
+        is_held = (values <= self._low) & (push < 0.0) | (values >= self._high) & (push > 0.0)
+        rows = np.flatnonzero(~is_held)
+        if not len(rows):
+            return None
+        part, distance = state.jacobian[:, rows], self._left(state)
+        ends = _APART * np.eye(len(values))[rows]
+        change = [state.at(values + end).jacobian - state.jacobian for end in ends]
+        second = np.array(change)[:, :, rows] / _APART
+        curvature = part.T @ part - np.einsum("a,iaj->ij", error, second)
+        sizes, vectors = np.linalg.eigh(curvature)
+        for vector in vectors.T[sizes < -_SADDLE * self._size**2]:
+            for bend in (_BEND, -_BEND):
+                moved = values.copy()
+                moved[rows] += bend * vector
+                better: _State | None = state.at(np.clip(moved, self._low, self._high))
+                for _ in range(4):
+                    if better is None:
+                        break
+                    if self._left(better) < distance * (1.0 - 1e-6):
+                        return better
+                    better = self._improved(better)
+        return None
+
+
+class _State:
+    """Rotation DOFs (N,) of a chain, with the joint's position (3,) and derivatives (3, N)."""
+
+    def __init__(self, position: Position, values: Floats) -> None:
+        self._position, self.values = position, values
+        self.place, self.jacobian = position.at(values)
+
+    def at(self, values: Floats) -> _State:
+        """Return the state at other DOFs."""
+        return _State(self._position, values)
