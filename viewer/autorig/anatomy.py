@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.autorig.solid import RESOLUTION, Solid, solid_of
+from viewer.autorig.medial import LevelSets, Paths, Protrusion
+from viewer.autorig.solid import Solid, solid_within
 from viewer.data_classes import dataclass
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
@@ -31,7 +32,6 @@ from viewer.rigs.arrays import Bools, Floats, Ints
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_MOST_VOXELS = 80_000  # above which a coarser grid is used: a ball fills half of its box
 _ANGLES = 36  # directions of the sagittal plane that are tried, every 5 degrees
 _FINE = np.radians([-2.5, -1.25, 1.25, 2.5])  # around the best of them
 _TILTED = 0.02  # gain of symmetry for which an oblique plane is preferred to a coordinate plane
@@ -39,15 +39,11 @@ _BOTH_WAYS = 0.01  # difference of symmetries that is within the accuracy of vox
 _MIRRORED = 4000  # voxels that are mirrored
 _TRUNK_PART = 0.1  # smallest part of trunk or head in the plane, as a fraction of the largest
 
-_BAND = 1.5  # thickness of a level set of the geodesic distance, in voxels
 _PROMINENT = 0.06  # shortest persistence of a limb, as a fraction of the size
 _OWN = 0.4  # shortest persistence of a limb, as a fraction of its length: fingers have less
 _PAIRED = 0.3  # largest difference of two limbs of a pair, as a fraction of the size
 _MOST_PAIRS = 4  # longest pairs that are considered
 
-# Exponent of the radius in the cost of a path. Above 1, a detour through the middle of a wide part
-# is worth its length.
-_MEDIAL = 1.5
 _UPPER = (0.45, 0.95)  # part of a limb's path with the smallest radius of the upper limb
 _WIDER = 1.5  # ratio of radii at the junction with the trunk
 _ON_GROUND = 0.12  # height of the tip of a leg, as a fraction of the figure's height
@@ -134,32 +130,6 @@ class Anatomy:
         return bool((tips - self.ground <= _ON_GROUND * self.height).all())
 
 
-class Paths:
-    """Shortest paths through the middle of a solid."""
-
-    def __init__(self, solid: Solid) -> None:
-        self.steps: csr_array = solid.graph()
-        self.radii = solid.radii()
-        # Close to the surface, the radius is known to half a voxel only.
-        wide = np.maximum(self.radii / solid.spacing, 0.5)
-        self._graph: csr_array = solid.graph(wide**-_MEDIAL)
-
-    def to(self, ends: Ints, starts: Ints) -> list[Ints]:
-        """Return the path from each start to the nearest of the ends, as rows of the solid."""
-        from scipy.sparse import csgraph
-
-        _, before, _ = csgraph.dijkstra(
-            self._graph, indices=ends, min_only=True, return_predecessors=True
-        )
-        found = []
-        for start in starts.tolist():
-            rows = [start]
-            while before[rows[-1]] >= 0:
-                rows.append(int(before[rows[-1]]))
-            found.append(np.array(rows, dtype=np.int32))
-        return found
-
-
 def anatomy_of(
     positions: Floats, triangles: Ints, up: Floats, lateral: Floats | None = None
 ) -> Anatomy:
@@ -167,12 +137,9 @@ def anatomy_of(
     from scipy.sparse import csgraph
 
     with part_of_work(span=(0.0, 0.3)):
-        solid = solid_of(positions, triangles)
-        if len(solid.voxels) > _MOST_VOXELS:
-            coarser = (_MOST_VOXELS / len(solid.voxels)) ** (1.0 / 3.0)
-            solid = solid_of(positions, triangles, max(16, int(RESOLUTION * coarser)))
+        solid = solid_within(positions, triangles)
     report_fraction(0.3, "anatomy")
-    lateral, offset, symmetry = _sagittal_plane(solid, up, lateral)
+    lateral, offset, symmetry = sagittal_plane(solid, up, lateral)
     centers = solid.centers(solid.voxels)
     sides = centers @ lateral - offset
     paths = Paths(solid)
@@ -183,7 +150,8 @@ def anatomy_of(
     )
     report_fraction(0.5, "anatomy")
     size = float(solid.spacing * np.ptp(solid.voxels, axis=0).max())
-    tips = _tips(steps, np.where(np.isfinite(distances), distances, 0.0), solid.spacing)
+    known = np.where(np.isfinite(distances), distances, 0.0)
+    tips = LevelSets(steps, known, solid.spacing).tips(_is_limb).rows
     tips = tips[distances[tips] >= _PROMINENT * size]
     report_fraction(0.8, "anatomy")
     limbs = [
@@ -200,9 +168,7 @@ def anatomy_of(
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
 
-def _sagittal_plane(
-    solid: Solid, up: Floats, lateral: Floats | None
-) -> tuple[Floats, float, float]:
+def sagittal_plane(solid: Solid, up: Floats, lateral: Floats | None) -> tuple[Floats, float, float]:
     """Return normal and offset of the vertical plane of best mirror symmetry, and the symmetry."""
     from scipy import ndimage
 
@@ -267,57 +233,9 @@ def _middle(steps: csr_array, is_near: Bools) -> Ints:
     return found
 
 
-def _tips(steps: csr_array, distances: Floats, spacing: float) -> Ints:
-    """Return the prominent maxima of the distance: rows of the solid.
-
-    Two protrusions that merge are one, with the longer tip, unless the part of the shorter one
-    beyond their junction is at least ``_OWN`` of its length.
-    """
-    from scipy.sparse import coo_array, csgraph
-
-    # Level sets, not voxels: a surface of voxels has many small maxima.
-    bands = (distances / (_BAND * spacing)).astype(np.int64)
-    links = steps.tocoo()
-    same = bands[links.row] == bands[links.col]
-    level = coo_array((np.ones(int(same.sum())), (links.row[same], links.col[same])), steps.shape)
-    count, labels = csgraph.connected_components(level, directed=False)
-    farthest = np.zeros(count)
-    np.maximum.at(farthest, labels, distances)
-    band = np.zeros(count, dtype=np.int64)
-    band[labels] = bands
-    below = bands[links.row] > bands[links.col]
-    edges = np.unique(np.stack([labels[links.row[below]], labels[links.col[below]]], 1), axis=0)
-    above: list[list[int]] = [[] for _ in range(count)]
-    for high, low in edges.tolist():
-        above[low].append(high)
-    # From the farthest level sets towards the plane, each keeps the tips of those above it.
-    group = list(range(count))
-    kept = [[node] for node in range(count)]
-
-    def root(node: int) -> int:
-        while group[node] != node:
-            group[node] = group[group[node]]
-            node = group[node]
-        return node
-
-    for node in np.argsort(-band, kind="stable").tolist():
-        joined = {root(high) for high in above[node]}
-        tips = sorted({tip for one in joined for tip in kept[one]}, key=lambda tip: farthest[tip])
-        if tips:
-            junction = _BAND * spacing * float(band[node])
-            # The farthest tip stays; others if most of their length is their own.
-            kept[node] = [
-                tip for tip in tips[:-1] if farthest[tip] - junction >= _OWN * farthest[tip]
-            ] + tips[-1:]
-        for one in joined:
-            group[one] = node
-    found = sorted({tip for node in range(count) if root(node) == node for tip in kept[node]})
-    is_tip = np.isin(labels, found)
-    rows = np.flatnonzero(is_tip)
-    # The farthest voxel of each of these level sets.
-    order = rows[np.lexsort((-distances[rows], labels[rows]))]
-    first = np.unique(labels[order], return_index=True)[1]
-    return order[first].astype(np.int32)
+def _is_limb(found: Protrusion) -> bool:
+    """Return whether most of a protrusion is its own."""
+    return found.tip - found.junction >= _OWN * found.tip
 
 
 def _paired(

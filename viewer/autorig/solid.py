@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 RESOLUTION = 96
 """Default number of voxels along the longest side of the mesh's box."""
+MOST_VOXELS = 80_000
+"""Number above which ``solid_within`` uses a coarser grid: a ball fills half of its box."""
 
 _MARGIN = 2  # voxels outside the box, so that the outside is connected
 # Offset of the grid, in voxels: symmetric meshes have vertices and edges in the planes of a centred
@@ -135,6 +137,17 @@ def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -
     numbers[inside] = np.arange(len(voxels))
     tree = spatial.cKDTree(origin + spacing * voxels)
     return Solid(origin, spacing, inside, distance, voxels, numbers, tree)
+
+
+def solid_within(
+    positions: Floats, triangles: Ints, finest: int = RESOLUTION, most: int = MOST_VOXELS
+) -> Solid:
+    """Return the voxels inside a mesh, as fine as ``finest`` with about ``most`` voxels allows."""
+    solid = solid_of(positions, triangles)
+    resolution = int(RESOLUTION * (most / len(solid.voxels)) ** (1.0 / 3.0))
+    if len(solid.voxels) > most or finest > RESOLUTION:
+        solid = solid_of(positions, triangles, min(max(16, resolution), finest))
+    return solid
 
 
 def _outward(positions: Floats, triangles: Ints) -> Floats:

@@ -1,0 +1,158 @@
+"""Level sets of the geodesic distance in a solid, and shortest paths through its middle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.autorig.solid import Solid
+from viewer.data_classes import dataclass
+from viewer.rigs.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+_BAND = 1.5  # thickness of a level set of the geodesic distance, in voxels
+# Exponent of the radius in the cost of a path. Above 1, a detour through the middle of a wide part
+# is worth its length.
+_MEDIAL = 1.5
+
+
+class Paths:
+    """Shortest paths through the middle of a solid."""
+
+    def __init__(self, solid: Solid) -> None:
+        self.steps: csr_array = solid.graph()
+        self.radii = solid.radii()
+        # Close to the surface, the radius is known to half a voxel only.
+        wide = np.maximum(self.radii / solid.spacing, 0.5)
+        self._graph: csr_array = solid.graph(wide**-_MEDIAL)
+
+    def to(self, ends: Ints, starts: Ints) -> list[Ints]:
+        """Return the path from each start to the nearest of the ends, as rows of the solid."""
+        from scipy.sparse import csgraph
+
+        _, before, _ = csgraph.dijkstra(
+            self._graph, indices=ends, min_only=True, return_predecessors=True
+        )
+        found = []
+        for start in starts.tolist():
+            rows = [start]
+            while before[rows[-1]] >= 0:
+                rows.append(int(before[rows[-1]]))
+            found.append(np.array(rows, dtype=np.int32))
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Protrusion:
+    """A part of the level sets above a junction, as seen from there."""
+
+    tip: float
+    """Largest distance of its tip."""
+    junction: float
+    """Distance at which it merges with others."""
+    base: tuple[int, ...]
+    """Its level sets just above the junction."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tips:
+    """The ends of the protrusions of a solid."""
+
+    rows: Ints
+    """(N,). The farthest voxel of each, as rows of the solid, in ascending order of level sets."""
+    meetings: tuple[tuple[float, frozenset[int]], ...]
+    """Distances at which two or more of them merge, and the indices of all that have merged."""
+
+
+class LevelSets:
+    """Connected level sets of the geodesic distance from a part of a solid."""
+
+    def __init__(self, steps: csr_array, distances: Floats, spacing: float) -> None:
+        from scipy.sparse import coo_array, csgraph
+
+        self._distances, self._thickness = distances, _BAND * spacing
+        bands = (distances / self._thickness).astype(np.int64)
+        links = steps.tocoo()
+        same = bands[links.row] == bands[links.col]
+        level = coo_array(
+            (np.ones(int(same.sum())), (links.row[same], links.col[same])), steps.shape
+        )
+        self.count, self.labels = csgraph.connected_components(level, directed=False)
+        """Number of level sets, and the one of each voxel (N,)."""
+        self._farthest = np.zeros(self.count)
+        np.maximum.at(self._farthest, self.labels, distances)
+        self._band = np.zeros(self.count, dtype=np.int64)
+        self._band[self.labels] = bands
+        below = bands[links.row] > bands[links.col]
+        pairs = np.stack([self.labels[links.row[below]], self.labels[links.col[below]]], 1)
+        self._above: list[list[int]] = [[] for _ in range(self.count)]
+        for high, low in np.unique(pairs, axis=0).tolist():
+            self._above[low].append(high)
+
+    def tips(self, stays: Callable[[Protrusion], bool]) -> Tips:
+        """Return the prominent maxima of the distance.
+
+        Protrusions that merge are one, with the tip of the longest, unless the shorter one
+        ``stays``. Level sets are used because a surface of voxels has many small maxima.
+        """
+        group = list(range(self.count))
+        kept = [[node] for node in range(self.count)]
+        meetings: list[tuple[float, list[int]]] = []
+
+        def root(node: int) -> int:
+            while group[node] != node:
+                group[node] = group[group[node]]
+                node = group[node]
+            return node
+
+        # From the farthest level sets inwards, each keeps the tips of those above it.
+        for node in np.argsort(-self._band, kind="stable").tolist():
+            bases: dict[int, list[int]] = {}
+            for high in self._above[node]:
+                bases.setdefault(root(high), []).append(high)
+            base_of = {tip: tuple(base) for one, base in bases.items() for tip in kept[one]}
+            tips = sorted(base_of, key=lambda tip: float(self._farthest[tip]))
+            if tips:
+                junction = self._thickness * float(self._band[node])
+                others = [
+                    tip
+                    for tip in tips[:-1]
+                    if stays(Protrusion(float(self._farthest[tip]), junction, base_of[tip]))
+                ]
+                kept[node] = others + tips[-1:]
+                if len({base_of[tip] for tip in kept[node]}) > 1:
+                    meetings.append((junction, kept[node]))
+            for one in bases:
+                group[one] = node
+        found = sorted(
+            {tip for node in range(self.count) if root(node) == node for tip in kept[node]}
+        )
+        number = {tip: index for index, tip in enumerate(found)}
+        met = [
+            (at, frozenset(number[tip] for tip in those if tip in number)) for at, those in meetings
+        ]
+        rows = np.flatnonzero(np.isin(self.labels, found))
+        # The farthest voxel of each of these level sets.
+        order = rows[np.lexsort((-self._distances[rows], self.labels[rows]))]
+        first = np.unique(self.labels[order], return_index=True)[1]
+        return Tips(
+            order[first].astype(np.int32), tuple((at, those) for at, those in met if len(those) > 1)
+        )
+
+    def half_widths(self, centers: Floats) -> Floats:
+        """Return the half of each level set's largest extent, from its voxels' centres (N, 3)."""
+        # A disc of radius r has a variance of r^2 / 4 along each of its axes, so that r is twice
+        # the root of the largest eigenvalue of the covariance; a strip of width w gets 0.58 w.
+        sizes = np.bincount(self.labels, minlength=self.count)
+        means = np.stack([np.bincount(self.labels, column) for column in centers.T], axis=1)
+        apart = centers - (means / sizes[:, None])[self.labels]
+        covariance = np.zeros((self.count, 3, 3))
+        for i in range(3):
+            for j in range(3):
+                covariance[:, i, j] = np.bincount(self.labels, apart[:, i] * apart[:, j]) / sizes
+        widths: Floats = 2.0 * np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 2], 0.0))
+        return widths
