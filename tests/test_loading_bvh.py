@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError, RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import scene_box
+from viewer.rigs.scene import pose_actors, scene_box
 
 BESIDE = MotionSettings(drives=False)
 GUESS = "centimetres assumed (skeleton 170 high)"

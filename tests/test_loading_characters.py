@@ -13,9 +13,9 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, begin, capturing, load, read_files
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_map import JointMap
+from viewer.rigs.scene import pose_actors
 from viewer.rigs.skinning import joint_matrices
 
 LIMBS = {

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import pose_actors
 
 BVH = """HIERARCHY
 ROOT pelvis

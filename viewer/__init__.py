@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from viewer.rigs.figure import Figure
     from viewer.rigs.material import Material, Texture
     from viewer.rigs.mesh import Mesh
-    from viewer.rigs.motion.actor_arrays import at, joints, vertices
     from viewer.rigs.motion.clip import Channel, Clip, evaluate, sample
     from viewer.rigs.motion.motion_arrays import MotionArrays, motion
     from viewer.rigs.motion.onion import onion
@@ -73,7 +72,6 @@ __all__ = [
     "ViewerError",
     "animate",
     "apply_record",
-    "at",
     "batch",
     "deform",
     "deform_frames",
@@ -81,7 +79,6 @@ __all__ = [
     "export",
     "figure",
     "joint_matrices",
-    "joints",
     "load",
     "mirror_pose",
     "motion",
@@ -93,7 +90,6 @@ __all__ = [
     "sample",
     "shaped",
     "show",
-    "vertices",
     "video",
     "with_rest_mesh",
     "write",
@@ -124,7 +120,6 @@ _HOMES = {
     "ViewerError": "errors",
     "animate": "loading.own_arrays",
     "apply_record": "rigs.posing.pose_record",
-    "at": "rigs.motion.actor_arrays",
     "batch": "commands._batch.calling",
     "deform": "rigs.skinning",
     "deform_frames": "rigs.skinning",
@@ -132,7 +127,6 @@ _HOMES = {
     "export": "commands._exports",
     "figure": "loading.own_arrays",
     "joint_matrices": "rigs.skinning",
-    "joints": "rigs.motion.actor_arrays",
     "load": "loading",
     "mirror_pose": "rigs.retargeting.mirror",
     "motion": "rigs.motion.motion_arrays",
@@ -144,7 +138,6 @@ _HOMES = {
     "sample": "rigs.motion.clip",
     "shaped": "rigs.shape",
     "show": "app.window",
-    "vertices": "rigs.motion.actor_arrays",
     "video": "commands._pictures",
     "with_rest_mesh": "rigs.shape",
     "write": "formats",

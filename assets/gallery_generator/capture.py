@@ -16,10 +16,9 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import placement_matrix
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 
 __all__ = ["Person", "camera_at", "write_cameras", "write_frames"]
 

@@ -13,8 +13,7 @@ from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.arrays import Bytes, Floats
 from viewer.rigs.captures.cameras import CameraView
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Scene
+from viewer.rigs.scene import Scene, pose_actors
 
 __all__ = ["write_images"]
 

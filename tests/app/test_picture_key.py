@@ -11,8 +11,9 @@ import viewer
 from viewer.app.pace import picture_key
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.annotation import Marks
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.clip_edit import clip_from_pose
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skinning import Skinning
 
 SIZE = (64, 48)

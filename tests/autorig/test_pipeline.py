@@ -18,9 +18,8 @@ from viewer.progress import Cancelled, receiving
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.pose import rest_pose
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skinning import deform
 
 pytestmark = pytest.mark.slow

@@ -19,10 +19,9 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Motion, Scene, scene_box
+from viewer.rigs.scene import Actor, Motion, Scene, pose_actors, scene_box
 
 GOAL = 0.05
 N_FRAMES, SECONDS = 300, 10.0

@@ -35,7 +35,7 @@ def test_time_poses_a_copy():
     camera = viewer.Camera(distance=8.0, azimuth=0.0, inclination=0.0)
     later = viewer.render(actor, SIZE, camera, time=1.0)
     assert actor["joint_1"].tolist() == [0, 0, 0]
-    np.testing.assert_array_equal(later, viewer.render(viewer.at(actor, 1.0), SIZE, camera))
+    np.testing.assert_array_equal(later, viewer.render(actor.at(1.0), SIZE, camera))
     assert (later != viewer.render(actor, SIZE, camera)).any()
 
 
@@ -61,6 +61,16 @@ def test_unknown_joints_and_other_objects_are_refused():
         viewer.render(viewer.load(), SIZE, look_at="nobody")
     with pytest.raises(ViewerError, match=r"^render: expected a scene or an actor, found list"):
         viewer.render([viewer.load()])
+
+
+def test_times_that_no_motion_reaches_are_refused(tmp_path):
+    actor = moving_square()
+    with pytest.raises(ViewerError, match=r"^time: expected 0 to 1.5 seconds, found 9"):
+        viewer.render(actor, SIZE, time=9.0)
+    with pytest.raises(ViewerError, match=r"^time: expected 0 to 1.5 seconds, found -1"):
+        viewer.export(actor, tmp_path / "a.obj", time=-1.0)
+    with pytest.raises(ViewerError, match=r"^time: expected seconds, found inf"):
+        viewer.render(actor, SIZE, time=float("inf"))
 
 
 def test_given_options_are_not_changed():

@@ -11,8 +11,7 @@ from viewer.formats import write
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.motion.clip_edit import clip_from_frames
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 

@@ -10,9 +10,10 @@ from seamed import POSITIONS, seamed_actor
 from viewer.exporters import export
 from viewer.formats import Source, pose
 from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.pose import Pose
 from viewer.rigs.posing.pose_record import apply_record
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 
 
 def posed() -> Actor:

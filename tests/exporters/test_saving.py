@@ -28,14 +28,14 @@ from viewer.exporters._rigged_files import files_of, without_correctives, write_
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
 from viewer.rigs.blendshapes import Correctives
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.posing.pose_record import apply_record
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skinning import deform
 
 # VRM files need a humanoid and are saved like glTF files.

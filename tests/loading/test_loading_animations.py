@@ -22,10 +22,10 @@ from viewer.rigs.captures.points import PointClip, PointLayout
 from viewer.rigs.figure import Figure, FigureGroup, read_from
 from viewer.rigs.geometry.rotation import quaternion_to_matrix, rotation_vector_to_matrix
 from viewer.rigs.motion.body_motion import ParameterMotion
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import Animation
 from viewer.rigs.pose import joint_rotations
+from viewer.rigs.scene import pose_actors
 from viewer.rigs.skinning import deform
 
 

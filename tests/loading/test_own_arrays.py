@@ -68,29 +68,29 @@ def test_rotations_of_every_representation_turn_the_knee(kind):
     translations = [[0, 0, 0], [0, 0, 5]]
     for how in (None, kind):
         actor = viewer.animate(square(), rotations, translations, fps=10, representation=how)
-        vertices, joints = viewer.vertices(actor), viewer.joints(actor)
+        vertices, joints = actor.vertices(), actor.joints()
         assert_allclose(vertices[0], SQUARE, atol=1e-12)
         # The last vertex (0, 2) turns about (0, 1) to (-1, 1).
         assert_allclose(vertices[1, 3], [-1, 1, 5], atol=1e-12)
         # (1, 2) turns to (-1, 2): a quarter of the way stays.
         assert_allclose(vertices[1, 2], [0.25 - 0.75, 2, 5], atol=1e-12)
         assert_allclose(joints[1], [[0, 0, 5], [0, 1, 5]], atol=1e-12)
-        assert_allclose(viewer.vertices(actor, time=0.1), vertices[1])
-        assert_allclose(viewer.joints(actor, time=0.1), joints[1])
+        assert_allclose(actor.vertices(time=0.1), vertices[1])
+        assert_allclose(actor.joints(time=0.1), joints[1])
 
 
 def test_absent_frames_are_not_a_number():
     turns = np.zeros((3, 2, 3))
     actor = viewer.animate(square(), turns, present=[True, False, True])
-    assert np.isnan(viewer.vertices(actor)[1]).all() and np.isnan(viewer.joints(actor)[1]).all()
-    assert np.isfinite(viewer.vertices(actor)[[0, 2]]).all()
+    assert np.isnan(actor.vertices()[1]).all() and np.isnan(actor.joints()[1]).all()
+    assert np.isfinite(actor.vertices()[[0, 2]]).all()
 
 
 def test_placement_moves_arrays_into_the_scene():
     actor = viewer.animate(square(), np.zeros((1, 2, 3)))
     actor.placement[:3, 3] = 10, 0, 0
-    assert_allclose(viewer.vertices(actor)[0], np.add(SQUARE, [10, 0, 0]))
-    assert_allclose(viewer.joints(actor, 0.0), np.add(JOINTS, [10, 0, 0]))
+    assert_allclose(actor.vertices()[0], np.add(SQUARE, [10, 0, 0]))
+    assert_allclose(actor.joints(0.0), np.add(JOINTS, [10, 0, 0]))
 
 
 def test_joints_are_read_and_rotated_by_name():
@@ -98,7 +98,7 @@ def test_joints_are_read_and_rotated_by_name():
     assert actor["knee"].tolist() == [0, 0, 0]
     actor["KNEE"] = [0, 0, np.pi / 2]
     assert_allclose(actor["knee"], [0, 0, np.pi / 2], atol=1e-12)
-    assert_allclose(viewer.vertices(actor)[0, 3], [-1, 1, 0], atol=1e-12)
+    assert_allclose(actor.vertices()[0, 3], [-1, 1, 0], atol=1e-12)
     with pytest.raises(RigError, match='no joint is called "kne"; did you mean knee'):
         actor["kne"] = [0, 0, 0]
     with pytest.raises(RigError, match=r"knee: expected a rotation vector \(3,\), found \[1, 2\]"):
@@ -109,11 +109,22 @@ def test_actor_at_a_time_is_a_copy_without_motion():
     turns = np.zeros((2, 2, 3))
     turns[1, 1, 2] = 1.0
     actor = viewer.animate(square(), turns, fps=1)
-    later = viewer.at(actor, 1.0)
+    later = actor.at(1.0)
     assert_allclose(later["knee"], [0, 0, 1.0], atol=1e-12)
     assert later.clip is None and actor["knee"].tolist() == [0, 0, 0]
     later["knee"] = [0, 0, 0.5]
-    assert_allclose(viewer.joints(later), viewer.joints(later, 7.0)[None])
+    assert_allclose(later.joints(), later.joints(7.0)[None])
+
+
+def test_times_outside_a_captured_motion_are_refused():
+    actor = viewer.animate(square(), np.zeros((3, 2, 3)), fps=10)
+    assert_allclose(actor.vertices(0.24), SQUARE)  # within half a frame of the end
+    for call in (actor.vertices, actor.joints, actor.at):
+        for wrong in (0.26, -1.0):
+            with pytest.raises(RigError, match=f"time: expected 0 to 0.2 seconds, found {wrong:g}"):
+                call(wrong)
+        with pytest.raises(RigError, match="time: expected seconds, found nan"):
+            call(float("nan"))
 
 
 def test_texture_and_coordinates_are_used():
@@ -174,9 +185,9 @@ def test_own_motion_survives_an_export(tmp_path):
     turns = np.zeros((5, 2, 3))
     turns[:, 1, 2] = np.linspace(0.0, 1.0, 5)
     actor = viewer.animate(square(unit="m"), turns, fps=10)
-    viewer.export(viewer.at(actor, 0.4), tmp_path / "own.obj")
+    viewer.export(actor.at(0.4), tmp_path / "own.obj")
     read = viewer.load(tmp_path / "own.obj")[0]
-    assert_allclose(viewer.vertices(read)[0], viewer.vertices(actor, 0.4), atol=1e-6)
+    assert_allclose(read.vertices()[0], actor.vertices(0.4), atol=1e-6)
 
 
 def test_scenes_and_actors_are_described_in_a_few_lines():
@@ -198,4 +209,4 @@ def test_model_of_a_capture_is_chosen_by_keyword(tmp_path):
     )
     scene = viewer.load(tmp_path / "walk.npz", model="body")
     assert scene[0].figure.name == "body"
-    assert viewer.vertices(scene["walk"]).shape == (4, 7813, 3)
+    assert scene["walk"].vertices().shape == (4, 7813, 3)

@@ -16,9 +16,8 @@ from viewer.rigs.captures.keypoint_layouts import keypoint_layout
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 from viewer.rigs.skinning import joint_matrices
 
 # Positions of the body25 keypoints of a walking person in metres, in the order of the layout.

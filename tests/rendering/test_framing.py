@@ -19,9 +19,8 @@ from viewer.rendering.framing import (
 from viewer.rendering.recorder import Follow, Recording
 from viewer.rigs.captures.points import PointClip, PointLayout
 from viewer.rigs.figure import Figure
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Scene, scene_points
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_points
 
 ASPECT = 16 / 9
 LAYOUT = PointLayout("two", ("left_knee", "nose"), np.zeros((0, 2)), np.array([1, 0]))

@@ -16,8 +16,7 @@ from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Follow, Recording, record
 from viewer.rendering.renderer import Renderer
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor, Scene, scene_box
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_box
 
 SIZE = 64, 48
 FULL = OutputError("disk full")

@@ -18,11 +18,11 @@ from viewer.rendering.scalar_quantities import ScalarBuffer, name_for
 from viewer.rigs import scalars
 from viewer.rigs.annotations import BodyParts
 from viewer.rigs.blendshapes import Correctives
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scalars import SCALARS, compute
-from viewer.rigs.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rigs.scene import Actor, Scene, scene_box
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import Skinning
 

@@ -16,10 +16,9 @@ from viewer.rigs.blendshapes import (
     regress_joints,
 )
 from viewer.rigs.expressions import ExpressionRules
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.morph_target import MorphTarget, with_morphs
 from viewer.rigs.posing.pose_record import apply_record, record_of
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import rest_joints, shaped
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import deform

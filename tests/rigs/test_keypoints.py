@@ -10,11 +10,10 @@ from rigs.hand_made import matrix, mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rigs.annotations import BodyParts, Keypoints, ReducedMesh, keypoint_positions
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.hands import Hand, hand_coefficients, hand_vectors
 from viewer.rigs.keypoints import posed_keypoints, some_vertices
 from viewer.rigs.pose import rest_pose
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import Skinning, deform, joint_matrices
 

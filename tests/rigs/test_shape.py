@@ -14,10 +14,9 @@ from rigs.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
 from viewer.errors import RigError
 from viewer.rigs.blendshapes import BlendShapes, Correctives, JointRegressor
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.memo import Memo
 from viewer.rigs.pose import rest_pose
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import rest_joints, rest_positions, shaped, shaped_skeleton, with_rest_mesh
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import deform

@@ -25,10 +25,10 @@ from viewer.app.rigging.rigging import Rigging
 from viewer.data_classes import dataclass
 from viewer.formats import opened_text
 from viewer.phrases import printable
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.motion.spring_motion import release_springs
 from viewer.rigs.pose import Pose, pose_of
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 
 _MOST_LISTED = 6
 _LONGEST = 40  # maximum length of a name in characters

@@ -72,10 +72,9 @@ def export(
     OutputError
         If a file cannot be written, or is one of those that were opened.
     """
-    from viewer.commands._pictures import scene_of, without_dashes
+    from viewer.commands._pictures import scene_at, scene_of, without_dashes
     from viewer.commands.convert import check_outputs, selected
     from viewer.exporters import ExportOptions, export, output_files
-    from viewer.rigs.motion.evaluation import pose_actors
 
     chosen = replace(options) if options is not None else ExportOptions()
     chosen.skinning = chosen.skinning if skinning is None else skinning
@@ -89,8 +88,7 @@ def export(
     with without_dashes():
         asked.frames.check_range()
         if time is not None:
-            scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
-            pose_actors(scene.actors, time)
+            scene = scene_at(scene, time)
         selection, chosen, notes = selected(asked, chosen, scene, Path(path))
         # Files of the scene may still be read.
         files = output_files(selection, Path(path), chosen)

@@ -101,8 +101,8 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     """Return the frame numbering of some actors' motions at a rate, frames per second."""
     # The longest capture defines it: at its own rate, which is the default, frames have the numbers
     # in its files. At another rate, or if there are only keyframed clips, frames count from 0.
-    from viewer.rigs.motion.evaluation import scene_rate, time_span
     from viewer.rigs.motion.timing import frame_at
+    from viewer.rigs.scene import scene_rate, time_span
 
     captures = [actor.captured for actor in actors if actor.captured is not None]
     longest = max(captures, key=lambda clip: clip.end - clip.start, default=None)
@@ -199,7 +199,7 @@ def apply_time(scene: Scene, frames: Frames) -> list[str | Diagnostic]:
     # A scene without a motion has one pose, which is its frame 0 and the pose at all times.
     if not frames.is_one:
         return []
-    from viewer.rigs.motion.evaluation import pose_actors
+    from viewer.rigs.scene import pose_actors
 
     option = "--time" if frames.frame is None else frames.option
     if frames.frame is not None and frames.time is not None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from viewer.commands._frames import numbering_of
 from viewer.commands._scalar import scalar_notes
 from viewer.commands._scene import SceneOptions
 from viewer.commands._sequence import Request, parse_turntable
@@ -22,8 +24,7 @@ from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.offscreen import render as draw
 from viewer.rendering.options import SIZE, DisplayOptions, Quality
 from viewer.rigs.arrays import Bytes
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor, Scene, scene_points
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_points
 
 _OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
 
@@ -96,8 +97,7 @@ def render(
     """
     scene, shown = scene_of(scene, "render"), _display(options, background, quality, scalar)
     if time is not None:
-        scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
-        pose_actors(scene.actors, time)
+        scene = scene_at(scene, time)
     view = ViewOptions(
         look_at=look_at,
         distance=distance,
@@ -216,6 +216,18 @@ def scene_of(what: Scene | Actor, name: str) -> Scene:
     files = [origin.path for origin in what.figure.origins]
     files += [] if what.clip_origin is None else [what.clip_origin[0]]
     return Scene([what], files=files)
+
+
+def scene_at(scene: Scene, time: float) -> Scene:
+    """Return a copy of a scene, posed at a time that its motions reach."""
+    if not math.isfinite(time):
+        raise ViewerError(f"time: expected seconds, found {time}")
+    scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
+    if any(actor.clip is not None for actor in scene.actors):
+        with without_dashes():
+            time = numbering_of(scene.actors).checked_time(time)
+        pose_actors(scene.actors, time)
+    return scene
 
 
 def _display(

@@ -35,9 +35,10 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.comparison import Difference, Measure, MeasureKind, compare
 from viewer.rigs.comparison.steps import FrameRange
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.clip import Clip, suits
 from viewer.rigs.scalars import length_unit
-from viewer.rigs.scene import Actor, Motion, Scene, figure_pose
+from viewer.rigs.scene import Actor, Motion, Scene
 from viewer.rigs.skinning import Skinning
 from viewer.rigs.units import METRES
 from viewer.streams import require_stdout, summary_stream

@@ -55,13 +55,13 @@ from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable, rounded
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 

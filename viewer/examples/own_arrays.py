@@ -17,6 +17,6 @@ tube = viewer.figure(vertices, faces, weights=weights, joints=joints, names=["ro
 rotations = np.zeros((31, 2, 3))  # rotation vectors: the elbow bends by 90 degrees in a second
 rotations[:, 1, 2] = np.linspace(0.0, np.pi / 2, 31)
 actor = viewer.animate(tube, rotations, fps=30)
-end = viewer.vertices(actor, time=1.0)[-4:].mean(axis=0)
+end = actor.vertices(time=1.0)[-4:].mean(axis=0)
 print(f"the end of the tube moves to {end.round(6) + 0.0}")
 viewer.export(actor, "tube.glb")

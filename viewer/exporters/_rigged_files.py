@@ -16,10 +16,10 @@ from viewer.exporters.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import Remedy, counted
 from viewer.rigs.arrays import Arrays
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.mesh import vertex_normals
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights
 from viewer.rigs.skin import influence_counts, limit_influences
 from viewer.rigs.skinning import Skinning, deform, joint_matrices

@@ -16,9 +16,9 @@ from viewer.formats import Source, all_or_none, keeping_written, write
 from viewer.formats.pose import read
 from viewer.phrases import counted
 from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.pose import Pose, joint_rotations
 from viewer.rigs.posing.pose_record import apply_record, record_of
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.skinning import deform, joint_matrices
 

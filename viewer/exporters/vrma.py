@@ -28,7 +28,7 @@ from viewer.exporters.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
 from viewer.rigs.arrays import Floats
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.file_record import Json
 from viewer.rigs.geometry.quaternion import align_signs
 from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_quaternion
@@ -36,7 +36,6 @@ from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.motion.evaluation import Frames, frames_of, world_frames
 from viewer.rigs.motion.sampled_animation import SampledAnimation
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.units import METRES
 
 _EXTENSION = "VRMC_vrm_animation"

@@ -16,8 +16,7 @@ from viewer.phrases import listed
 from viewer.progress import report
 from viewer.rigs.arrays import Ints
 from viewer.rigs.motion.animation_choice import play_animation
-from viewer.rigs.motion.evaluation import scene_rate
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, scene_rate
 
 _NAMED = 3  # maximum number of animations that a note names
 

@@ -35,17 +35,11 @@ from viewer.rigs.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.motion.animation_choice import animation_labels
 from viewer.rigs.motion.clip import Clip
-from viewer.rigs.motion.evaluation import (
-    JointMotion,
-    frames_between,
-    frames_of,
-    time_span,
-    world_frames,
-)
+from viewer.rigs.motion.evaluation import JointMotion, frames_between, frames_of, world_frames
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.scalars import length_text
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, time_span
 from viewer.rigs.shape import rest_joints, shaped
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.units import METRES

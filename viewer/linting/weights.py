@@ -11,11 +11,11 @@ from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import counted, listed, optional
 from viewer.rigs.arrays import Bools
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.inspection.faults import are_singular, weight_faults
 from viewer.rigs.motion.evaluation import frames_of, pose_of
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import FIRST_ROTATION, clamp_dofs, joint_labels
 from viewer.rigs.skin import (
     Skin,

@@ -259,7 +259,7 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     if wanted or any(actor.figure.animations for actor in draft.actors):
         _animate(draft, wanted)
     if any(actor.clip is not None for actor in draft.actors):
-        from viewer.rigs.motion.evaluation import pose_actors, time_span
+        from viewer.rigs.scene import pose_actors, time_span
 
         start = time_span(draft.actors)[0]
         pose_actors(draft.actors, start)
@@ -360,8 +360,8 @@ def _switch_on_springs(draft: SceneDraft, up: str) -> None:
     skeletons = [(actor, actor.figure.skeleton) for actor in draft.actors]
     if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
         return
-    from viewer.rigs.motion.evaluation import pose_actors, time_span
     from viewer.rigs.motion.spring_motion import springs_for
+    from viewer.rigs.scene import pose_actors, time_span
 
     start = time_span(draft.actors)[0]
     for actor in draft.actors:

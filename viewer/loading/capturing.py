@@ -20,18 +20,17 @@ from viewer.rigs.captures.cameras import CameraView
 from viewer.rigs.captures.capture import Capture, CapturePart
 from viewer.rigs.captures.person import is_tracked, person_label
 from viewer.rigs.captures.points import PointClip, PointLayout
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, parameter_clip
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rate
 from viewer.rigs.motion.spring_motion import springs_for
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_map import JointMap
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor, pose_actors
 
 _COLORS = (
     (0.85, 0.42, 0.28),

@@ -24,12 +24,12 @@ from viewer.rigs.feet.legs import legs_of
 from viewer.rigs.feet.planting import lock_feet
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import bounding_box, box_size
-from viewer.rigs.motion.evaluation import frames_of, pose_actors, world_frames
+from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.upright import own_up
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.scalars import length_text
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.units import METRES

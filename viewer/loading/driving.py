@@ -40,13 +40,12 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rigs.motion.clip import Clip, misfit, suits
-from viewer.rigs.motion.evaluation import scene_rate
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_names import joint_meanings
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, scene_rate
 
 _CAMERA = "video"  # name of the camera for captures that have none
 _SAME_RATE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30

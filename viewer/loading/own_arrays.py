@@ -184,7 +184,7 @@ def animate(
     RigError
         If the figure has no skeleton, or shapes do not fit it.
     """
-    from viewer.rigs.motion.evaluation import pose_actors
+    from viewer.rigs.scene import pose_actors
 
     skeleton = figure.require_skeleton()
     quaternions = _quaternions(rotations, skeleton.n_joints, representation)

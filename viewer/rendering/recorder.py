@@ -34,9 +34,8 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
 from viewer.rigs.arrays import Bytes, Floats
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.follow import followed_point
-from viewer.rigs.scene import Scene, scene_box
+from viewer.rigs.scene import Scene, pose_actors, scene_box
 
 _WAITING = 1  # number of frames that may wait for a worker, limited to save memory
 _PATIENCE = 0.05  # seconds between steps while the sink finishes

@@ -15,7 +15,7 @@ from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.pose import Pose
+from viewer.rigs.pose import Pose, rest_pose
 from viewer.rigs.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -256,3 +256,10 @@ class FigureGroup:
     def __post_init__(self) -> None:
         if not self.figures:
             raise RigError(f"{self.name}: expected at least one figure, found none")
+
+
+def figure_pose(figure: Figure) -> Pose:
+    """Return a new pose of a figure with a skeleton: the pose and shape weights of the file."""
+    pose = rest_pose(figure.require_skeleton())
+    pose.shape_weights = figure.rest_shape_weights.copy()
+    return pose

@@ -13,14 +13,17 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.phrases import counted, printable
+from viewer.progress import report
 from viewer.rigs.arrays import Floats
 from viewer.rigs.bodies.smpl_family import ShapeSpace
-from viewer.rigs.figure import Figure, skeleton_points
+from viewer.rigs.figure import Figure, figure_pose, skeleton_points
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import bounding_box, box_size, visible_vertices
-from viewer.rigs.pose import Pose, placement_matrix, rest_pose
+from viewer.rigs.motion.timing import DEFAULT_RATE, frame_times
+from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.shape import shaped_skeleton
+from viewer.rigs.skeleton import FIRST_ROTATION, find_joint
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,9 +31,11 @@ if TYPE_CHECKING:
     from viewer.rigs.captures.cameras import CameraImages, CameraView
     from viewer.rigs.captures.points import PointClip
     from viewer.rigs.motion.clip import Clip
+    from viewer.rigs.motion.evaluation import Frames
     from viewer.rigs.motion.sampled_clip import SampledClip
     from viewer.rigs.motion.transform_clip import TransformClip
     from viewer.rigs.retargeting.drive import Drive
+    from viewer.rigs.skinning import Skinning
 
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
@@ -63,7 +68,7 @@ class Actor:
     pose: Pose | None = None
     """This actor's own pose; None if the figure has no skeleton."""
     clip: Motion | None = None
-    """Its motion, which ``viewer.rigs.motion.evaluation.pose_actors`` evaluates."""
+    """Its motion, which ``pose_actors`` evaluates."""
     placement: Floats = field(default_factory=lambda: np.eye(4))
     """(4, 4). Figure space to scene space."""
     visible: bool = True
@@ -185,7 +190,6 @@ class Actor:
         """Return a joint's rotation relative to its parent as a rotation vector, radians: (3,)."""
         from viewer.rigs.geometry.rotation import matrix_to_rotation_vector
         from viewer.rigs.pose import joint_rotations
-        from viewer.rigs.skeleton import find_joint
 
         skeleton = self.figure.require_skeleton()
         turned = joint_rotations(skeleton, self.require_pose())
@@ -195,7 +199,6 @@ class Actor:
         """Rotate a joint relative to its parent by a rotation vector, radians: (3,)."""
         from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
         from viewer.rigs.posing.pose_vector import set_joint_rotations
-        from viewer.rigs.skeleton import find_joint
 
         skeleton = self.figure.require_skeleton()
         vector = np.asarray(rotation, dtype=np.float64)
@@ -204,6 +207,122 @@ class Actor:
         joints = np.array([find_joint(skeleton, joint)], dtype=np.int32)
         turned = rotation_vector_to_matrix(vector)[None]
         set_joint_rotations(skeleton, self.require_pose(), joints, turned, "quaternion")
+
+    def vertices(self, time: float | None = None, skinning: Skinning | None = None) -> Floats:
+        """Return the vertices in the scene's space, at one time or of all frames.
+
+        Parameters
+        ----------
+        time : float, optional
+            Seconds of its motion; all frames of the motion if omitted, one without a motion.
+        skinning : Skinning, optional
+            Skinning method and options.
+
+        Returns
+        -------
+        (V, 3) or (F, V, 3)
+            float64 at the time, or of all frames; NaN where the actor is absent.
+
+        Raises
+        ------
+        RigError
+            If the figure has no mesh, or the motion does not reach the time.
+
+        >>> import viewer
+        >>> viewer.load("fox")[0].vertices().shape
+        (1, 7561, 3)
+        """
+        from viewer.rigs.motion.evaluation import pose_of
+        from viewer.rigs.skinning import deform
+
+        figure, mesh = self.figure, self.figure.require_mesh()
+        if figure.skeleton is None:
+            placed = apply_transform(self.placement, mesh.positions)
+            return placed[None] if time is None else placed
+        frames = self._frames(time)
+        found = np.full((frames.n_frames, mesh.n_vertices, 3), np.nan)
+        for number, frame in enumerate(np.flatnonzero(frames.present).tolist()):
+            report(number, frames.n_frames, what="skinning frames")
+            posed, _ = deform(figure, pose_of(figure, frames, frame), skinning or "lbs")
+            found[frame] = apply_transform(self.placement, posed)
+        return found if time is None else found[0]
+
+    def joints(self, time: float | None = None) -> Floats:
+        """Return the positions of the joints, as ``vertices`` does for the mesh.
+
+        Parameters
+        ----------
+        time : float, optional
+            Seconds of its motion; all frames of the motion if omitted, one without a motion.
+
+        Returns
+        -------
+        (J, 3) or (F, J, 3)
+            float64 at the time, or of all frames; NaN where the actor is absent.
+
+        Raises
+        ------
+        RigError
+            If the figure has no skeleton, or the motion does not reach the time.
+        """
+        from viewer.rigs.motion.evaluation import world_frames
+
+        frames = self._frames(time)
+        places = world_frames(self.figure, frames)[..., :3, 3]
+        placed = apply_transform(self.placement, places.reshape(-1, 3)).reshape(places.shape)
+        placed[~frames.present] = np.nan
+        return placed if time is None else placed[0]
+
+    def at(self, time: float) -> Actor:
+        """Return a copy in the pose at a time, which no longer moves.
+
+        Parameters
+        ----------
+        time : float
+            Seconds of its motion.
+
+        Returns
+        -------
+        Actor
+            Independent of the first one; only the figure is shared.
+
+        Raises
+        ------
+        RigError
+            If the motion does not reach the time.
+        """
+        copy = self.copy()
+        pose_actors([copy], self._reached(time))
+        copy.clip = None
+        return copy
+
+    def _frames(self, time: float | None) -> Frames:
+        """Return the frames of its motion, or one at a time; its pose without a motion."""
+        from viewer.rigs.motion.evaluation import frames_of, still_frames
+
+        motion, figure = self.joint_motion, self.figure
+        figure.require_skeleton()
+        if motion is None:
+            return still_frames(figure, self.require_pose())
+        if time is None:
+            times = frame_times(motion.start, motion.end, motion.frame_rate)
+        else:
+            times = np.array([self._reached(time) - self.offset])
+        return frames_of(figure, motion, times, self.pose)
+
+    def _reached(self, time: float) -> float:
+        """Return a time; RigError if a captured motion lacks it, as only keys hold or run on."""
+        if not math.isfinite(time):
+            raise RigError(f"time: expected seconds, found {time}")
+        clip = self.captured
+        if clip is None:
+            return time
+        start, end = clip.start + self.offset, clip.end + self.offset
+        # The end is rarely known exactly.
+        half = 0.5 / clip.timing.frame_rate
+        if not start - half <= time <= end + half:
+            raise RigError(f"time: expected {start:.6g} to {end:.6g} seconds, found {time:g}")
+        return min(max(time, start), end)
 
     def copy(self) -> Actor:
         """Return a copy that is posed and placed independently; figure and clip are shared."""
@@ -222,13 +341,6 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
         number += 1
         free = f"{title}-{number}"
     return free
-
-
-def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the pose and shape weights of the file."""
-    pose = rest_pose(figure.require_skeleton())
-    pose.shape_weights = figure.rest_shape_weights.copy()
-    return pose
 
 
 @dataclass(slots=True, eq=False, weakref_slot=True)
@@ -304,6 +416,82 @@ class Scene:
         if self.world_up is not None:
             return self.world_up
         return self.actors[0].figure.up if self.actors else "y"
+
+
+def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
+    """Return the seconds from the earliest start to the latest end of all clips."""
+    spans = [
+        (actor.clip.start + actor.offset, actor.clip.end + actor.offset)
+        for actor in actors
+        if actor.clip is not None
+    ]
+    return min((low for low, _ in spans), default=0.0), max(
+        (high for _, high in spans), default=0.0
+    )
+
+
+def scene_rate(actors: Iterable[Actor]) -> float:
+    """Return the rate of the timeline: that of the longest capture, or else of the longest keys."""
+    clips = [actor.clip for actor in actors if actor.clip is not None]
+    captured = [clip for clip in clips if clip.timing is not None]
+    keyed = [clip for clip in clips if clip.kind == "transforms"]
+    longest = max(captured or keyed, key=lambda clip: clip.end - clip.start, default=None)
+    return DEFAULT_RATE if longest is None else longest.frame_rate
+
+
+def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
+    """Pose actors with clips at a time of the scene's clock: ``pose``, ``points``, ``is_present``.
+
+    ``interpolate`` crosses gaps of captures instead of marking actors as absent.
+    """
+    from viewer.rigs.motion.evaluation import set_poses
+
+    groups: dict[tuple[int, int], list[Actor]] = {}
+    for actor in actors:
+        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
+    for group in groups.values():
+        clip, figure = group[0].clip, group[0].figure
+        if clip is None or (figure.skeleton is None and clip.points is None):
+            continue
+        times = np.array([time - actor.offset for actor in group])
+        found = clip.sample(figure.skeleton, times, interpolate)
+        rows, poses = list[int](), list[Pose]()
+        for row, (actor, is_present) in enumerate(zip(group, found.present.tolist(), strict=True)):
+            actor.is_present = is_present
+            if found.points is not None:
+                actor.points = found.points[row] if is_present else None
+            elif is_present and actor.pose is not None:
+                rows.append(row)
+                poses.append(actor.pose)
+        if figure.skeleton is not None and poses:
+            set_poses(found, np.array(rows), figure.skeleton, poses)
+        for actor in group:
+            if actor.springs is not None and actor.is_present:
+                actor.springs.swing(actor, time - actor.offset)
+
+
+def still_pose(actor: Actor) -> Pose:
+    """Return a copy of an actor's pose, with what its motion sets reset to the pose of the file."""
+    own, pose, motion = figure_pose(actor.figure), actor.require_pose().copy(), actor.joint_motion
+    if motion is None:
+        return pose
+    skeleton = actor.figure.require_skeleton()
+    found = motion.sample(skeleton, np.array([motion.start]))
+    is_rotation = skeleton.dof_kinds >= FIRST_ROTATION
+    is_set = np.isin(np.arange(skeleton.n_dofs), found.targets)
+    is_set |= np.isin(skeleton.dof_joints, found.rotated) & is_rotation
+    is_set |= np.isin(skeleton.dof_joints, found.translated) & ~is_rotation
+    pose.dofs[is_set] = own.dofs[is_set]
+    pose.rotations[found.rotated] = own.rotations[found.rotated]
+    pose.translations[found.translated] = own.translations[found.translated]
+    pose.scales[found.scaled] = own.scales[found.scaled]
+    known = found.weighted[found.weighted < len(pose.shape_weights)]
+    pose.shape_weights[known] = own.shape_weights[known]
+    if found.figure_translations is not None:
+        pose.figure_translation = own.figure_translation
+    if found.figure_scales is not None:
+        pose.figure_scale = own.figure_scale
+    return pose
 
 
 def scene_points(scene: Scene, show: Shown = "skin") -> Floats:

@@ -13,8 +13,7 @@ from viewer.app.context_menu import ContextMenu
 from viewer.app.core.reasons import no_panel
 from viewer.app.files.motion_export import save_motion
 from viewer.loading import MotionSettings, load
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 
 
 @pytest.fixture

@@ -19,8 +19,7 @@ from viewer.app.layout import ShownPanels
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import scene_points
+from viewer.rigs.scene import pose_actors, scene_points
 
 streaming = test_timeline.streaming  # the fixture of the timeline tests
 ROOM = 1.08  # margin around a fitted figure

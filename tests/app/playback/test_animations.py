@@ -16,9 +16,9 @@ from viewer.app.playback.animations import choose_animation, played
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.loading import Contents, begin
-from viewer.rigs.figure import read_from
+from viewer.rigs.figure import figure_pose, read_from
 from viewer.rigs.motion.transform_clip import Animation
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 
 SIZE = (1180, 760)
 

@@ -18,7 +18,7 @@ from viewer.app.weights.weights_panel import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import pose_actors
 
 
 @pytest.fixture

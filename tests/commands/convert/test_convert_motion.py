@@ -17,8 +17,7 @@ import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings, load
 from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skinning import Skinning, deform
 
 

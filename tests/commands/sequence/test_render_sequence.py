@@ -20,9 +20,8 @@ from viewer.errors import OutputError, ViewerError
 from viewer.rigs.captures.points import PointClip, PointLayout
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.clip import Clip
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 
 pytestmark = pytest.mark.slow
 av = pytest.importorskip("av")

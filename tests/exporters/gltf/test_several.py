@@ -16,12 +16,12 @@ import viewer
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, Part, Selection, export
 from viewer.rigs.captures.cameras import CameraView
-from viewer.rigs.motion.evaluation import frames_of, pose_actors, pose_of
+from viewer.rigs.motion.evaluation import frames_of, pose_of
 from viewer.rigs.motion.sampled_animation import upright_animation
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 from viewer.rigs.skinning import deform
 
 SINGLE = 2e-6  # for lengths up to 5

@@ -17,12 +17,13 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, Part, Selection, export
 from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.motion.evaluation import pose_of
 from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.skin import Skin
 from viewer.rigs.skinning import Skinning, deform

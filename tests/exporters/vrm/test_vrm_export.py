@@ -20,9 +20,8 @@ from viewer.exporters import VrmMeta, export
 from viewer.exporters.vrm.humanoid import human_bones
 from viewer.linting import lint_files
 from viewer.loading import load
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.humanoid import Humanoid
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import shaped
 
 LICENCE = "https://vrm.dev/licenses/1.0/"

@@ -14,9 +14,8 @@ from viewer.cli import run
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions
 from viewer.loading import MotionSettings, load
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.sampled_animation import single_frame
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 
 LIMBS = (("leftUpperArm", "leftLowerArm"), ("rightUpperLeg", "rightLowerLeg"), ("hips", "head"))
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)

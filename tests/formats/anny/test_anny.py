@@ -22,7 +22,7 @@ from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.formats.anny import ACTIONS
 from viewer.loading import MotionSettings
-from viewer.rigs.scene import figure_pose
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.shape import rest_joints, shaped
 from viewer.rigs.skinning import deform
 

@@ -13,8 +13,7 @@ from viewer.cli import run
 from viewer.formats.fbx.contents import target_weights
 from viewer.rigs.captures.carried_view import view_in
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skinning import Skinning, file_method
 
 pytestmark = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")

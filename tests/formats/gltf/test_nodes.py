@@ -23,7 +23,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Recording
 from viewer.rigs.captures.carried_view import view_in
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
-from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import pose_actors
 
 HALF = math.sqrt(0.5)
 

@@ -19,8 +19,8 @@ import viewer
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading import MotionSettings
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.posing.pose_record import PoseRecord, apply_record
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skinning import deform, deform_frames, joint_matrices
 
 ROUNDING = 1e-10  # centimetres; the numbers are stored in single precision and computed in double

@@ -33,9 +33,8 @@ from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._scene_graph.grouping import group_nodes
 from viewer.loading.assembly import assemble
 from viewer.loading.contents import Contents
-from viewer.rigs.figure import Figure, FigureGroup
+from viewer.rigs.figure import Figure, FigureGroup, figure_pose
 from viewer.rigs.geometry.rotation import axis_rotations
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skinning import deform
 
 TURNED = [0.3, -0.5, 0.1, 0.8]

@@ -23,8 +23,8 @@ from viewer.formats._scene_graph.content import (
     Primitive,
 )
 from viewer.formats._scene_graph.figures import figure_group
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.material import Material
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skinning import deform
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

@@ -9,9 +9,9 @@ import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.rigs.bodies.joint_posing import DOF_NAMES, JOINTS
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.instances import pose_arrays, worlds
 from viewer.rigs.posing.pose_vector import read_vector
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import shaped
 from viewer.rigs.skinning import deform, joint_matrices
 

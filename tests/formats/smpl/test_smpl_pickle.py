@@ -22,10 +22,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import viewer
 from viewer.errors import FormatError
 from viewer.rigs.bodies.smpl_family import animal_of
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.posing.pose_vector import read_vector
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import joint_shifts, rest_joints, shaped
 from viewer.rigs.skinning import deform, joint_matrices
 

@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.loading import MotionSettings, load
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Scene
+from viewer.rigs.scene import Scene, pose_actors
 
 UPRIGHT = np.array([np.pi, 0.0, 0.0])
 """The rotation vector of a person who is upright in camera space, where y points down."""

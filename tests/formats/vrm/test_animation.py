@@ -16,7 +16,7 @@ from viewer.formats.gltf import read
 from viewer.loading import MotionSettings, load
 from viewer.loading.body_models import is_body
 from viewer.rigs.constraints.constraint import Constraint
-from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.scene import pose_actors
 from viewer.rigs.skinning import deform, joint_matrices
 
 BONES = ("hips", "spine", "head", "leftUpperArm", "leftLowerArm", "rightUpperArm")

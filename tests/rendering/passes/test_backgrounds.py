@@ -16,9 +16,8 @@ from viewer.rigs.captures.carried_view import view_in
 from viewer.rigs.captures.points import PointClip, PointLayout
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 
 EMPTY = Scene([])
 

@@ -23,10 +23,10 @@ from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.view import View, view_of
 from viewer.rigs.captures.points import PointLayout
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.mesh import bounding_box, box_size
-from viewer.rigs.scene import Actor, Scene, figure_pose, scene_box
+from viewer.rigs.scene import Actor, Scene, scene_box
 from viewer.rigs.skinning import METHODS, Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size, as for single actors

@@ -23,10 +23,10 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
 from viewer.rendering.view import View, normal_matrix
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.mesh import bounding_box, box_size
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights
 from viewer.rigs.skin import Skin, skin_from_lists
 from viewer.rigs.skinning import METHODS, Skinning

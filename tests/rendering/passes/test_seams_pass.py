@@ -9,9 +9,8 @@ import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import Skinning
 

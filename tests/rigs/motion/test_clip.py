@@ -26,9 +26,8 @@ from viewer.rigs.motion.clip import (
     misfit,
     slopes,
 )
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skeleton import DOF_KINDS
 from viewer.rigs.skinning import deform
 

@@ -17,23 +17,18 @@ import viewer
 from viewer.errors import RigError
 from viewer.loading import bundled_body
 from viewer.rigs.captures.points import PointClip, PointLayout
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.kinematics import skinning_matrices, world_matrices
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.motion.evaluation import (
-    Frames,
-    pose_actors,
-    still_pose,
-    world_frames,
-)
+from viewer.rigs.motion.evaluation import Frames, world_frames
 from viewer.rigs.motion.instances import local_rotations, placements, pose_arrays, worlds
 from viewer.rigs.motion.motion_paths import motion_path, path_times, segments
 from viewer.rigs.motion.onion import FAINTEST, onion
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, rest_pose
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene, pose_actors, still_pose
 from viewer.rigs.shape import shaped
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 

@@ -9,7 +9,7 @@ from rigs.animated import animated_leg, animation, bow, channel, clip_of, wave
 
 from viewer.errors import FormatError, RigError
 from viewer.rigs.blendshapes import BlendShapes
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import axis_rotations
 from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.mesh import Mesh
@@ -20,12 +20,12 @@ from viewer.rigs.motion.animation_choice import (
     play_animation,
 )
 from viewer.rigs.motion.clip import Clip
-from viewer.rigs.motion.evaluation import pose_actors, world_frames
+from viewer.rigs.motion.evaluation import world_frames
 from viewer.rigs.motion.sampled_animation import single_frame, upright_single_frame
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import Animation
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene, pose_actors
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 
 # Four frames per second from 1 s on: 1.0, 1.25, (1.5 and 1.75 missing), 2.0, 2.25

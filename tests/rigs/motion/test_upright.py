@@ -121,7 +121,7 @@ def test_upright_pose_equals_the_frame_of_the_upright_motion():
     actor.placement = rotation_transform(0, np.pi)
     scene = Scene([actor], world_up="z")
     animation, up = upright_animation(scene, actor)
-    viewer.rigs.motion.evaluation.pose_actors([actor], 0.0)
+    viewer.rigs.scene.pose_actors([actor], 0.0)
     found = upright_actor(scene, actor)
     assert (up, found.figure.up) == ("z", "z")
     framed = pose_of(actor.figure, animation.frames, 0)

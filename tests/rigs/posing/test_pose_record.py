@@ -9,11 +9,10 @@ from numpy.testing import assert_allclose
 from rigs.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.pose import Pose, joint_rotations, pose_key, rest_pose
 from viewer.rigs.posing.pose_record import PoseRecord, apply_record, record_of
 from viewer.rigs.posing.pose_vector import own_numbers
-from viewer.rigs.scene import figure_pose
 
 
 def vectors(figure: Figure, pose: Pose) -> np.ndarray:

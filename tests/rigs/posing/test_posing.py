@@ -16,7 +16,6 @@ from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.body_motion import parameter_pose
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import joint_rotations, rest_pose
@@ -30,7 +29,7 @@ from viewer.rigs.posing.pose_vector import (
     set_joint_rotations,
     write_vector,
 )
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skinning import deform
 

@@ -7,9 +7,8 @@ from rigs.hand_made import matrix, plain_skinning, skeleton, turn_x, turn_y
 
 from viewer.errors import RigError
 from viewer.rigs.blendshapes import BlendShapes, Correctives
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skin import skin_from_lists
 from viewer.rigs.skinning import Skinning, deform, deform_frames, joint_matrices, lbs
 from viewer.rigs.skinning.lbs import blocks_of

@@ -19,23 +19,16 @@ from rigs.animated import (
 )
 
 from viewer.errors import RigError
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.motion.evaluation import (
-    frames_between,
-    frames_of,
-    pose_actors,
-    pose_of,
-    scene_rate,
-    world_frames,
-)
+from viewer.rigs.motion.evaluation import frames_between, frames_of, pose_of, world_frames
 from viewer.rigs.motion.motion_paths import motion_path, path_times
 from viewer.rigs.motion.onion import onion
 from viewer.rigs.motion.sampled_animation import baked, frame_range, sample_animation, single_frame
 from viewer.rigs.motion.transform_clip import TransformClip, is_regular, key_rate, sample_transforms
 from viewer.rigs.pose import joint_rotations, local_matrices
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_rate
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.transform_keys.edit import (
     add_transform_key,

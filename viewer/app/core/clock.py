@@ -7,10 +7,9 @@ from dataclasses import field
 from typing import Literal, NamedTuple, TypeAlias
 
 from viewer.data_classes import dataclass
-from viewer.rigs.motion.evaluation import pose_actors, scene_rate, time_span
 from viewer.rigs.motion.timing import DEFAULT_RATE, frame_at
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_rate, time_span
 
 PlaybackMode: TypeAlias = Literal["loop", "once", "ping-pong", "run on"]
 MODES: dict[PlaybackMode, str] = {

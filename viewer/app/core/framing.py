@@ -15,9 +15,8 @@ from viewer.rendering.recorder import copied
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import bounding_box
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene, Shown, scene_points
+from viewer.rigs.scene import Actor, Scene, Shown, pose_actors, scene_points
 
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total

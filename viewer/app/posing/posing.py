@@ -22,13 +22,13 @@ from viewer.exporters import ExportOptions, Part, Selection, export, files_writt
 from viewer.exporters.pose import export as export_pose
 from viewer.formats import FORMATS, Source, file_stem
 from viewer.rigs.arrays import Floats
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.motion.upright import upright_actor
 from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.posing.pose_record import record_of
 from viewer.rigs.posing.pose_vector import write_vector
 from viewer.rigs.retargeting.mirror import mirror_pose
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 
 PoseTool: TypeAlias = Literal["select", "rotate", "move"]
 TOOLS: dict[PoseTool, tuple[str, str, str]] = {

@@ -34,11 +34,12 @@ from viewer.phrases import printable
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Ints
 from viewer.rigs.comparison.pairs import Pairs, row_distances
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.hierarchy import depth_first
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 from viewer.rigs.skin import Skin, owners
 

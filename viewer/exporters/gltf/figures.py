@@ -36,11 +36,11 @@ from viewer.phrases import agree, counted, listed, optional
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.file_record import Json
-from viewer.rigs.motion.evaluation import Frames, frames_of, still_frames, still_pose
+from viewer.rigs.motion.evaluation import Frames, frames_of, still_frames
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
 from viewer.rigs.pose import Pose
 from viewer.rigs.scalars import length_text
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, still_pose
 from viewer.rigs.skinning import Skinning
 
 # Comparison of the written animations

@@ -22,10 +22,10 @@ from viewer.exporters.gltf.materials import Color
 from viewer.exporters.gltf.nodes import locals_of
 from viewer.exporters.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.geometry.vectors import SignedUp
 from viewer.rigs.motion.evaluation import Frames, frames_between
 from viewer.rigs.motion.sampled_animation import SampledAnimation
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skeleton import joint_label
 
 

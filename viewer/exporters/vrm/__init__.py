@@ -36,11 +36,11 @@ from viewer.formats._vrm.upgrade import LICENCE
 from viewer.phrases import Remedy, agree, all_of, counted, listed, rounded
 from viewer.rigs.arrays import Floats
 from viewer.rigs.constraints.constraint import Constraint
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.file_record import Json, VrmRecord
 from viewer.rigs.humanoid import REQUIRED_BONES
 from viewer.rigs.pose import pose_key
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.springs.spring_joints import Springs
 from viewer.rigs.units import METRES, UNIT_NAMES
 

@@ -15,10 +15,9 @@ from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import View, set_model
 from viewer.rigs.arrays import Floats
 from viewer.rigs.mesh import bounding_box
-from viewer.rigs.motion.evaluation import still_pose
 from viewer.rigs.motion.motion_paths import MotionPath, motion_path, segments
 from viewer.rigs.pose import pose_key
-from viewer.rigs.scene import Actor, Motion
+from viewer.rigs.scene import Actor, Motion, still_pose
 
 _WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts

@@ -11,9 +11,8 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.captures.cameras import CameraPath, CameraView, extrinsics, view_at
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.motion.evaluation import pose_actors
 from viewer.rigs.motion.transform_clip import Animation, TransformClip
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 from viewer.rigs.skinning import joint_matrices
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats
-from viewer.rigs.motion.actor_arrays import joints, vertices
 from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.scene import Actor
 from viewer.rigs.units import METRES
@@ -60,7 +59,7 @@ def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
     RigError
         If joints or frames differ in number, units are unknown, or no frame has both.
     """
-    ours, theirs = joints(found), joints(reference)
+    ours, theirs = found.joints(), reference.joints()
     for axis, what in ((1, "joints"), (0, "frames")):
         if ours.shape[axis] != theirs.shape[axis]:
             raise RigError(
@@ -80,7 +79,7 @@ def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
     fitted = np.stack([_fitted(a, b) for a, b in zip(ours[seen], theirs[seen], strict=True)])
     pve = math.nan
     if found.figure.mesh is not None and reference.figure.mesh is not None:
-        body, other = vertices(found) * scales[0], vertices(reference) * scales[1]
+        body, other = found.vertices() * scales[0], reference.vertices() * scales[1]
         if body.shape == other.shape:
             pve = _mean((body - roots[0] - (other - roots[1]))[seen])
     return PoseErrors(

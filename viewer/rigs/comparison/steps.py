@@ -12,9 +12,9 @@ from viewer.errors import RigError
 from viewer.phrases import counted, rounded
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.comparison.pairs import pair_names
-from viewer.rigs.motion.evaluation import pose_actors
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skeleton import Skeleton, dof_labels
 
 FrameRange = tuple[int | None, int | None]

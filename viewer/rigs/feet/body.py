@@ -13,14 +13,13 @@ from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.feet.contacts import FootPath
 from viewer.rigs.feet.legs import Leg, legs_of, reach
 from viewer.rigs.feet.soles import Soles, extent, soles_of_feet
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.hierarchy import path_to_root, with_ancestors
 from viewer.rigs.kinematics import joint_worlds
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import rest_joints, shaped
 from viewer.rigs.skeleton import Skeleton
 

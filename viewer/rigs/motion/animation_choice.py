@@ -9,10 +9,10 @@ from viewer.diagnostics import note
 from viewer.errors import FormatError, RigError
 from viewer.near_names import name_hint
 from viewer.phrases import quoted
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.motion.transform_clip import Animation, TransformClip
 from viewer.rigs.motion.upright import own_up
-from viewer.rigs.scene import Actor, Scene, figure_pose
+from viewer.rigs.scene import Actor, Scene
 
 NONE = "none"
 """Name that selects no animation."""

@@ -17,14 +17,13 @@ from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Floats, freeze, freeze_fields
 from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.coefficients import apply_coefficients, space_misfit, unused_coefficients
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import StatedUp
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import Pose, joint_rotations, local_matrices
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.shape import joint_shifts, rest_joints
 from viewer.rigs.units import METRES
 

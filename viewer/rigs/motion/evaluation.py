@@ -1,12 +1,12 @@
-"""Evaluation of motions: poses of actors at one time, and of one figure at many times as arrays.
+"""Evaluation of motions: poses at one time, and of one figure at many times as arrays.
 
-Motions are sampled for both: ``Samples`` replace values of each actor's pose, or of one pose in all
-frames.
+Motions are sampled for both: ``Samples`` replace values of several poses, or of one pose in all
+frames. ``pose_actors`` (``viewer.rigs.scene``) does the first for the actors of a scene.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -17,18 +17,16 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.constraints.evaluation import constrained
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.quaternion import multiply
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rigs.kinematics import joint_worlds
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.samples import Samples, joint_samples
-from viewer.rigs.motion.timing import DEFAULT_RATE
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.pose import Pose, dof_rotations, joint_offsets, joint_rotations
 from viewer.rigs.posing.pose_vector import rotate_joints
-from viewer.rigs.scene import Actor, figure_pose
 from viewer.rigs.shape import joint_shifts, moved_rest_translations, rest_joints
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 
@@ -72,56 +70,6 @@ class Frames:
         return self.rotations, self.translations, *places, self.shape_weights, self.scales
 
 
-def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
-    """Return the seconds from the earliest start to the latest end of all clips."""
-    spans = [
-        (actor.clip.start + actor.offset, actor.clip.end + actor.offset)
-        for actor in actors
-        if actor.clip is not None
-    ]
-    return min((low for low, _ in spans), default=0.0), max(
-        (high for _, high in spans), default=0.0
-    )
-
-
-def scene_rate(actors: Iterable[Actor]) -> float:
-    """Return the rate of the timeline: that of the longest capture, or else of the longest keys."""
-    clips = [actor.clip for actor in actors if actor.clip is not None]
-    captured = [clip for clip in clips if clip.timing is not None]
-    keyed = [clip for clip in clips if clip.kind == "transforms"]
-    longest = max(captured or keyed, key=lambda clip: clip.end - clip.start, default=None)
-    return DEFAULT_RATE if longest is None else longest.frame_rate
-
-
-def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
-    """Pose actors with clips at a time of the scene's clock: ``pose``, ``points``, ``is_present``.
-
-    ``interpolate`` crosses gaps of captures instead of marking actors as absent.
-    """
-    groups: dict[tuple[int, int], list[Actor]] = {}
-    for actor in actors:
-        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
-    for group in groups.values():
-        clip, figure = group[0].clip, group[0].figure
-        if clip is None or (figure.skeleton is None and clip.points is None):
-            continue
-        times = np.array([time - actor.offset for actor in group])
-        found = clip.sample(figure.skeleton, times, interpolate)
-        rows, poses = list[int](), list[Pose]()
-        for row, (actor, is_present) in enumerate(zip(group, found.present.tolist(), strict=True)):
-            actor.is_present = is_present
-            if found.points is not None:
-                actor.points = found.points[row] if is_present else None
-            elif is_present and actor.pose is not None:
-                rows.append(row)
-                poses.append(actor.pose)
-        if figure.skeleton is not None and poses:
-            set_poses(found, np.array(rows), figure.skeleton, poses)
-        for actor in group:
-            if actor.springs is not None and actor.is_present:
-                actor.springs.swing(actor, time - actor.offset)
-
-
 def set_poses(
     found: Samples, rows: NDArray[np.intp], skeleton: Skeleton, poses: Sequence[Pose]
 ) -> None:
@@ -156,30 +104,6 @@ def set_poses(
             pose.figure_translation[:] = found.figure_translations[row]
         if found.figure_scales is not None:
             pose.figure_scale = float(found.figure_scales[row])
-
-
-def still_pose(actor: Actor) -> Pose:
-    """Return a copy of an actor's pose, with what its motion sets reset to the pose of the file."""
-    own, pose, motion = figure_pose(actor.figure), actor.require_pose().copy(), actor.joint_motion
-    if motion is None:
-        return pose
-    skeleton = actor.figure.require_skeleton()
-    found = motion.sample(skeleton, np.array([motion.start]))
-    is_rotation = skeleton.dof_kinds >= FIRST_ROTATION
-    is_set = np.isin(np.arange(skeleton.n_dofs), found.targets)
-    is_set |= np.isin(skeleton.dof_joints, found.rotated) & is_rotation
-    is_set |= np.isin(skeleton.dof_joints, found.translated) & ~is_rotation
-    pose.dofs[is_set] = own.dofs[is_set]
-    pose.rotations[found.rotated] = own.rotations[found.rotated]
-    pose.translations[found.translated] = own.translations[found.translated]
-    pose.scales[found.scaled] = own.scales[found.scaled]
-    known = found.weighted[found.weighted < len(pose.shape_weights)]
-    pose.shape_weights[known] = own.shape_weights[known]
-    if found.figure_translations is not None:
-        pose.figure_translation = own.figure_translation
-    if found.figure_scales is not None:
-        pose.figure_scale = own.figure_scale
-    return pose
 
 
 def _span(columns: Ints) -> Ints | slice:

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rigs.motion.evaluation import pose_actors
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, pose_actors
 
 FAINTEST = 0.22
 """Opacity of the earliest pose."""

@@ -8,22 +8,16 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.geometry.vectors import axis_vector, unit
-from viewer.rigs.motion.evaluation import (
-    JointMotion,
-    frames_of,
-    rest_translations_of,
-    still_pose,
-    world_frames,
-)
+from viewer.rigs.motion.evaluation import JointMotion, frames_of, rest_translations_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing, frame_times
 from viewer.rigs.pose import Pose, PoseKey, pose_key
 from viewer.rigs.posing.pose_vector import set_joint_rotations
-from viewer.rigs.scene import Actor, figure_pose
+from viewer.rigs.scene import Actor, still_pose
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.springs.simulation import STEPS_PER_SECOND, PosedJoints, SpringTrack
 from viewer.rigs.springs.spring_joints import Springs

@@ -24,7 +24,7 @@ from viewer.errors import RigError
 from viewer.phrases import Remedy, agree, counted, listed, one_of, rounded
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.expressions import OLD_PRESETS
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix, up_rotation
 from viewer.rigs.hierarchy import path_to_root
@@ -41,7 +41,6 @@ from viewer.rigs.retargeting.rest_alignment import (
     rest_of,
 )
 from viewer.rigs.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skeleton import Skeleton, joint_label, joint_labels
 
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))

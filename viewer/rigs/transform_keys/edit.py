@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.quaternion import conjugate, multiply
 from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.motion.clip import Channel, hermite
@@ -27,7 +27,6 @@ from viewer.rigs.motion.transform_clip import (
     sample_transforms,
 )
 from viewer.rigs.pose import Pose, joint_rotations, local_matrices
-from viewer.rigs.scene import figure_pose
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.transform_keys.euler_curves import TransformRow, angles_of, from_angles, rows_of
 
