@@ -24,6 +24,7 @@ _ES_HEADER = """#version 300 es
 precision highp float;
 precision highp int;
 precision highp sampler2D;
+precision highp sampler2DArray;
 precision highp sampler2DShadow;
 """
 

@@ -29,7 +29,7 @@ from viewer.exporters._left_out import motion_notes, of_figure
 from viewer.exporters._losses.largest_distances import REGULAR, evenly
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
-from viewer.exporters.html.figures import pack_mesh, pack_skin, plain
+from viewer.exporters.html.figures import is_lit, pack_mesh, pack_skin, pack_studio, plain
 from viewer.exporters.html.motion import Tracks, pack_tracks, size_of, tracks_of
 from viewer.exporters.html.packing import Packer, unpacked
 from viewer.formats import save_text
@@ -37,6 +37,8 @@ from viewer.phrases import counted, file_size, listed
 from viewer.progress import report
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.colors import colormap
+from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
+from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.lighting import SHADOW_STRENGTH
 from viewer.rendering.options import DisplayOptions, Lights
 from viewer.rendering.passes.background_pass import GRADIENT
@@ -60,7 +62,8 @@ _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")
 _SEEN = 9  # frames that the camera frames, at most
 _POSTER = (800, 450)
-_ASPECTS = (0.5, 1.0, 2.0)  # of which ``camera.js`` knows the distances that fit
+# Ratios of width and height of which ``camera.js`` knows the distances that fit: 1 : 2 to 2 : 1.
+_ASPECTS = 2.0 ** np.linspace(-1.0, 1.0, 13)
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
@@ -78,11 +81,14 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     header: Json = {
         **_stage(scene, points),
         "ramp": packer.add(ramp, 2.0**-12),
+        "samplers": {**SAMPLERS, **STUDIO_SAMPLERS},
         "title": path.stem,
         "figures": [figure for figure, _ in packed],
         "programs": _programs([figure for figure, _ in packed]),
         "items": packer.items,
     }
+    if any(is_lit(figure) for figure, _ in packed):
+        header["studio"] = pack_studio(packer)
     data = packer.text()
     poster = _poster(scene, shown)
     page = _page(header, data, poster, _description(shown))
@@ -163,9 +169,6 @@ class _Shown:
             }
         if figure.mesh is not None and figure.mesh.n_vertices:
             packed["mesh"], center = pack_mesh(self.tracks, actor.hidden_parts, packer, notes)
-            shapes = [pose.shape_weights for pose in self.poses if pose is not None]
-            if not all(np.array_equal(each, shapes[0]) for each in shapes):
-                notes.append("surfaces keep their first normals while blend shapes change")
             if figure.is_attached:
                 packed["skin"] = pack_skin(rest.require_skin(), how, packer)
                 packed["skin"]["isAffine"] = "stretches" in packed["motion"]
@@ -260,7 +263,7 @@ def _stage(scene: Scene, points: Floats) -> Json:
     """Return the members of the header about camera, lights, ground and background."""
     camera, box = facing_camera(guess_front(scene), scene.up), bounding_box(points)
     distances = []
-    for aspect in _ASPECTS:
+    for aspect in _ASPECTS.tolist():
         fit(camera, points, aspect)
         distances.append(camera.distance)
     lights = light_uniforms(view_of(camera, (1, 1), box), Lights())
@@ -299,18 +302,21 @@ def _programs(figures: Sequence[Json]) -> Json:
         "patch": [embedded_text("patch.vert"), embedded_text("ground_shadow.frag")],
         "lines": [embedded_text("edge.vert"), embedded_text("line.frag")],
     }
-    for figure in figures:
-        if "mesh" not in figure:
-            continue
-        macros = ("MATERIALS",) if figure["mesh"]["hasMaterials"] else ()
+    for mesh in [figure["mesh"] for figure in figures if "mesh" in figure]:
+        macros = ("MATERIALS",) * mesh["hasMaterials"]
         vertex = embedded_text("mesh.vert", "", macros)
-        surface = embedded_text("mesh.frag", "phong", (*macros, "SHADOWS"))
-        found["-".join(("mesh", *macros))] = [vertex, surface]
+        # The colours of weights are lit as surfaces without metalness and roughness.
+        for shading in ("phong", mesh["shading"]):
+            surface = embedded_text("mesh.frag", shading, (*macros, "SHADOWS"))
+            found["-".join(("mesh", shading, *macros))] = [vertex, surface]
         found["-".join(("depth", *macros))] = [vertex, embedded_text("depth.frag", "", macros)]
-        if "skin" in figure:
-            skin, affine = figure["skin"], ("AFFINE_PALETTE",) * figure["skin"]["isAffine"]
-            text = embedded_text("skin.vert", skin["method"], affine)
-            found["-".join(("skin", skin["method"], *affine))] = [text, _NOTHING]
+        if mesh["shading"] == "pbr" and any("outline" in each for each in mesh["surfaces"]):
+            surface = embedded_text("mesh.frag", "pbr", (*macros, "SHADOWS", "HULL"))
+            found["hull"] = [embedded_text("hull.vert", "", macros), surface]
+    for skin in [figure["skin"] for figure in figures if "skin" in figure]:
+        affine = ("AFFINE_PALETTE",) * skin["isAffine"]
+        text = embedded_text("skin.vert", skin["method"], affine)
+        found["-".join(("skin", skin["method"], *affine))] = [text, _NOTHING]
     return found
 
 

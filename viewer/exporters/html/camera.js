@@ -15,11 +15,12 @@ class Camera {
     this.factor = 1;
   }
 
-  // The distance at which everything is visible; known for three ratios of width and height.
+  // The distance at which everything is visible; known for some ratios of width and height.
   fitted(aspect) {
-    const { distances } = this.header.camera, place = Math.log2(aspect) + 1;  // 0 at 1 : 2
+    const { distances } = this.header.camera, last = distances.length - 1;
+    const place = 0.5 * last * (Math.log2(aspect) + 1);  // 0 at 1 : 2, and the last at 2 : 1
     if (place <= 0) return (distances[0] * 0.5) / aspect;
-    const low = Math.min(Math.floor(place), 1), part = Math.min(place - low, 1);
+    const low = Math.min(Math.floor(place), last - 1), part = Math.min(place - low, 1);
     return distances[low] + part * (distances[low + 1] - distances[low]);
   }
 
@@ -51,6 +52,17 @@ class Camera {
     // The up axis in camera space.
     const row = this.header.up === "z" ? 2 : 1;
     this.up = [this.view[4 * row], this.view[4 * row + 1], this.view[4 * row + 2]];
+  }
+
+  // The rotation from camera space to the studio's, which follows the camera: +y up, +z towards it.
+  get toStudio() {
+    const axes = this.axes, above = this.header.up === "z" ? [0, 0, 1] : [0, 1, 0];
+    const rise = dot(axes[2], above);
+    let level = axes[2].map((x, i) => x - rise * above[i]);
+    // Seen from straight above or below, the top of the image is away from the camera.
+    if (Math.hypot(...level) <= 1e-6) level = axes[1].map((x) => -Math.sign(rise) * x);
+    const back = normalized(level), front = [cross(above, back), above, back];
+    return axes.flatMap((axis) => front.map((row) => dot(row, axis)));
   }
 
   orbit(azimuth, inclination) {

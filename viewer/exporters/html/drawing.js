@@ -99,6 +99,7 @@ class NumberTexture {
 
   write() {
     const gl = this.gl;
+    gl.activeTexture(gl.TEXTURE0);  // the units of the studio and the shadow map stay as they are
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.width, this.height, this.format, gl.FLOAT, this.data);
@@ -128,4 +129,23 @@ function pictureTexture(gl, bitmap, { isLinear, repeats, isSmooth, minification 
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl[(minification || usual).toUpperCase()]);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, isSmooth ? gl.LINEAR : gl.NEAREST);
   return texture;
+}
+
+// Binds the studio's light and the split-sum table; pack_studio has written them.
+function useStudio(gl, studio, arrays, samplers) {
+  const [green, red, blue] = studio.light.map((item) => arrays[item].values);
+  const light = new Float32Array(3 * green.length);
+  green.forEach((value, i) => light.set([value + red[i], value, value + blue[i]].map(Math.pow.bind(null, 2)), 3 * i));
+  const bind = (kind, unit) => {
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(kind, gl.createTexture());
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(kind, side, gl.LINEAR);
+    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(kind, side, gl.CLAMP_TO_EDGE);
+  };
+  const { side, layers, table, tableSide } = studio;
+  bind(gl.TEXTURE_2D_ARRAY, samplers.u_studio);
+  gl.texImage3D(gl.TEXTURE_2D_ARRAY, 0, gl.RGB16F, side, side, layers, 0, gl.RGB, gl.FLOAT, light);
+  bind(gl.TEXTURE_2D, samplers.u_split_sum);
+  const factors = Float32Array.from(arrays[table].values);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG16F, tableSide, tableSide, 0, gl.RG, gl.FLOAT, factors);
 }

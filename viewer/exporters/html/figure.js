@@ -1,15 +1,16 @@
 // One figure: its buffers, skinned by skin.vert once per pose, and its drawing.
 
-const SAMPLERS = { u_palette: 0, u_pairs: 1, u_rigid: 2, u_places: 3 };
+const SKIN_SAMPLERS = { u_palette: 0, u_pairs: 1, u_rigid: 2, u_places: 3 };
 const EDGE_COLOR = [0.028, 0.039, 0.055, 0.55];      // premultiplied
 const BONE_COLOR = [0.81, 0.5, 0.09, 0.9], MARKED_COLOR = [0.9, 0.18, 0.1, 0.95];
 
 class Figure {
-  constructor(gl, programs, data, arrays, ramp) {
-    Object.assign(this, { gl, programs, data, arrays, ramp });
+  constructor(gl, programs, data, arrays, ramp, samplers) {
+    Object.assign(this, { gl, programs, data, arrays, ramp, samplers });
     this.tracks = new Tracks(data, arrays);
     this.isVisible = true;
     this.joint = -1;
+    this.isReflected = false;
     this.center = [0, 0, 0];
     this.isAttached = Boolean(data.skin);
     if (data.mesh) this.loadMesh(data.mesh);
@@ -24,18 +25,13 @@ class Figure {
     this.center = mesh.center;
     this.sources = Int32Array.from(get("sources"));
     this.nVertices = this.sources.length;
-    const normals = this.split(get("normals"), 3), positions = this.split(this.rest, 3);
+    this.restNormals = get("normals");
+    const normals = this.split(this.restNormals, 3), positions = this.split(this.rest, 3);
     this.positions = bufferOf(gl, positions, gl.ARRAY_BUFFER, gl.DYNAMIC_DRAW);
-    this.normals = bufferOf(gl, normals);
+    this.normals = bufferOf(gl, normals, gl.ARRAY_BUFFER, gl.DYNAMIC_DRAW);
     this.triangles = Uint32Array.from(get("triangles"));
     this.indices = bufferOf(gl, this.triangles, gl.ELEMENT_ARRAY_BUFFER);
-    // Position and unit normal of each split vertex, as skin.vert writes them.
-    const posed = new Float32Array(6 * this.nVertices);
-    for (let v = 0; v < this.nVertices; ++v) {
-      posed.set(positions.subarray(3 * v, 3 * v + 3), 6 * v);
-      posed.set(normalized(normals.subarray(3 * v, 3 * v + 3)), 6 * v + 3);
-    }
-    this.posed = bufferOf(gl, posed, gl.ARRAY_BUFFER, gl.DYNAMIC_COPY);
+    this.posed = bufferOf(gl, this.rows(positions, normals), gl.ARRAY_BUFFER, gl.DYNAMIC_COPY);
     this.colors = bufferOf(gl, new Float32Array(3 * this.nVertices), gl.ARRAY_BUFFER, gl.DYNAMIC_DRAW);
     this.attributes = {
       in_position: [this.posed, 3, 24, 0],
@@ -56,17 +52,39 @@ class Figure {
     if ("tints" in mesh) this.attributes.in_tint = [floats(this.split(get("tints"), 4)), 4];
     // Materials may sample the same image in different ways.
     const made = new Map();
-    this.surfaces = mesh.surfaces.map((surface) => ({ ...surface,
+    this.surfaces = mesh.surfaces.map((surface) => ({ ...surface, uniforms: { ...surface.uniforms },
       textures: surface.textures.map(({ unit, ...how }) => {
         const key = JSON.stringify(how);
         if (!made.has(key)) made.set(key, pictureTexture(gl, this.arrays[how.image], how));
         return { unit, texture: made.get(key) };
       }) }));
-    const macros = mesh.hasMaterials ? "-MATERIALS" : "";
-    this.surface = this.programs.get(`mesh${macros}`);
-    this.surfaceArray = vertexArray(gl, this.surface, this.attributes, this.indices);
-    this.depth = this.programs.get(`depth${macros}`);
+    this.plain = { uniforms: mesh.plain, textures: [], isBlended: false, isDoubleSided: true };
+    this.ranges = mesh.runs.map(([index, first, count]) =>
+      ({ surface: index < 0 ? this.plain : this.surfaces[index], first, count }));
+    this.blended = this.ranges.filter(({ surface }) => surface.isBlended);
+    this.macros = mesh.hasMaterials ? "-MATERIALS" : "";
+    this.depth = this.programs.get(`depth${this.macros}`);
     this.depthArray = vertexArray(gl, this.depth, this.attributes, this.indices);
+    this.arraysOf = new Map();
+  }
+
+  // The vertex array of a program; blended surfaces have their own, sorted triangles.
+  arrayOf(program, indices = this.indices) {
+    if (!this.arraysOf.has(program)) this.arraysOf.set(program, new Map());
+    const known = this.arraysOf.get(program);
+    if (!known.has(indices))
+      known.set(indices, vertexArray(this.gl, program, this.attributes, indices));
+    return known.get(indices);
+  }
+
+  // Position and unit normal of each split vertex, as skin.vert writes them.
+  rows(positions, normals) {
+    const found = new Float32Array(6 * this.nVertices);
+    for (let v = 0; v < this.nVertices; ++v) {
+      found.set(positions.subarray(3 * v, 3 * v + 3), 6 * v);
+      found.set(normalized(normals.subarray(3 * v, 3 * v + 3)), 6 * v + 3);
+    }
+    return found;
   }
 
   // Copies rows of vertices to the split vertices along texture seams.
@@ -122,27 +140,50 @@ class Figure {
     const [x, y, z, scale] = tracks.at("model");
     this.model = placed([x, y, z], scale);
     if (!this.data.mesh) return;
-    if (tracks.arrays.fields) {
-      const rest = addOffsets(this.rest, tracks.at("weights"), tracks.arrays.fields.values);
-      gl.bindBuffer(gl.ARRAY_BUFFER, this.positions);
-      gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.split(rest, 3));
-    }
+    this.deformRest();
+    for (const surface of this.surfaces)
+      for (const [name, item] of Object.entries(surface.changes || {})) {
+        const values = [...tracks.between(this.arrays[item])];
+        (name in surface.uniforms ? surface.uniforms : surface.outline.uniforms)[name] = values;
+      }
     if (this.isAttached) this.skin(tracks.palette(this.data.mesh.center));
+    this.sortedFor = null;
+  }
+
+  // Displaces the rest vertices, and computes or displaces the rest normals, as shape.py does.
+  deformRest() {
+    const gl = this.gl, tracks = this.tracks, { fields, normalFields } = tracks.arrays;
+    if (!fields && !normalFields) return;
+    const write = (buffer, values) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 0, values);
+    };
+    const weights = fields ? tracks.at("weights") : [], n = this.data.motion.nShapes;
+    let rest = addOffsets(this.rest, weights, fields, 0, n), normals = this.restNormals;
+    if (tracks.isRecomputed) normals = surfaceNormals(rest, this.triangles, this.sources);
+    else if (normalFields)
+      normals = addOffsets(normals, tracks.at("normalWeights"), normalFields, 0);
+    rest = this.split(addOffsets(rest, weights, fields, n), 3);
+    normals = this.split(normals, 3);
+    if (!this.isAttached) return write(this.posed, this.rows(rest, normals));
+    write(this.positions, rest);
+    if (tracks.arrays.recomputed || normalFields) write(this.normals, normals);
   }
 
   skin(palette) {
     const gl = this.gl, { center, restCenter } = palette;
     this.center = center;
+    this.isReflected = palette.orientation < 0;
     this.tracks.matrixTexels(palette, this.palette.data);
     this.tracks.rigidTexels(palette, this.rigid.data);
     this.places.data.set(center, 0);
     this.places.data.set(restCenter.map((c, axis) => c - center[axis]), 4);
     [this.palette, this.rigid, this.places].forEach((texture) => texture.write());
-    this.palette.use(SAMPLERS.u_palette);
-    this.pairs.use(SAMPLERS.u_pairs);
-    this.rigid.use(SAMPLERS.u_rigid);
-    this.places.use(SAMPLERS.u_places);
-    setUniforms(gl, this.skinning, { ...SAMPLERS, u_attached: true, u_first: 0,
+    this.palette.use(SKIN_SAMPLERS.u_palette);
+    this.pairs.use(SKIN_SAMPLERS.u_pairs);
+    this.rigid.use(SKIN_SAMPLERS.u_rigid);
+    this.places.use(SKIN_SAMPLERS.u_places);
+    setUniforms(gl, this.skinning, { ...SKIN_SAMPLERS, u_attached: true, u_first: 0,
       u_n_joints: palette.n, u_blend_factor: this.data.skin.blendFactor });
     gl.bindVertexArray(this.skinArray);
     gl.bindBuffer(gl.ARRAY_BUFFER, null);  // captured buffers must not be bound elsewhere
@@ -158,16 +199,23 @@ class Figure {
     gl.bindVertexArray(null);
   }
 
-  // Positions (V, 3) of the figure's vertices in its own space, as the shader computed them.
-  posedPositions() {
-    const gl = this.gl, rows = new Float32Array(6 * this.nVertices), found = [];
+  // Positions and unit normals of split vertices, in rows of six, as the shader computed them.
+  readPosed() {
+    const gl = this.gl, rows = new Float32Array(6 * this.nVertices);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.posed);
     gl.getBufferSubData(gl.ARRAY_BUFFER, 0, rows);
+    return rows;
+  }
+
+  // Positions and normals (V, 3) of the figure's vertices in its own space.
+  posedVertices() {
+    const rows = this.readPosed(), positions = [], normals = [];
     const [scale, offset] = [this.model[0], this.model.slice(12, 15)];
     this.sources.forEach((v, row) => {
-      found[v] = [0, 1, 2].map((i) => scale * (rows[6 * row + i] + this.center[i]) + offset[i]);
+      positions[v] = [0, 1, 2].map((i) => scale * (rows[6 * row + i] + this.center[i]) + offset[i]);
+      normals[v] = [...rows.subarray(6 * row + 3, 6 * row + 6)];
     });
-    return found;
+    return { positions, normals };
   }
 
   // Uniforms of all programs that draw the figure.
@@ -176,6 +224,17 @@ class Figure {
     const modelView = product4(camera.view, model);
     return { u_model_view: modelView, u_projection: camera.projection,
       u_normal_matrix: normalMatrix(modelView), u_orthographic: false };
+  }
+
+  // Scene units per unit of the figure.
+  get scale() {
+    return Math.cbrt(Math.abs(determinant(product4(this.data.placement, this.model))));
+  }
+
+  // Whether placement, or most of the skinning, reflects the figure: its triangles are then
+  // clockwise seen from their front.
+  get isMirrored() {
+    return (determinant(this.data.placement) < 0) !== this.isReflected;
   }
 
   // A sphere about the posed figure in scene space: its centre, and its radius.
@@ -190,11 +249,10 @@ class Figure {
     if (!this.isDrawn || !this.data.mesh) return;
     const gl = this.gl;
     gl.bindVertexArray(this.depthArray);
-    for (const [index, first, count] of this.data.mesh.runs) {
-      const surface = index < 0 ? null : this.surfaces[index];
-      setUniforms(gl, this.depth, { ...this.placing(light), u_color: this.data.color,
-        u_has_tint: "in_tint" in this.attributes, u_texture: 5, u_threshold: 0,
-        ...(surface ? surface.uniforms : { u_textured: false, u_alpha_mode: 0 }) });
+    for (const { surface, first, count } of this.ranges) {
+      setUniforms(gl, this.depth, { ...this.placing(light), ...this.samplers,
+        u_color: this.data.color, u_has_tint: "in_tint" in this.attributes, u_threshold: 0,
+        ...surface.uniforms });
       this.bindTextures(surface);
       gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
     }
@@ -202,7 +260,7 @@ class Figure {
   }
 
   bindTextures(surface) {
-    for (const { unit, texture } of surface ? surface.textures : []) {
+    for (const { unit, texture } of surface.textures) {
       this.gl.activeTexture(this.gl.TEXTURE0 + unit);
       this.gl.bindTexture(this.gl.TEXTURE_2D, texture);
     }
@@ -210,29 +268,83 @@ class Figure {
 
   get isDrawn() { return this.isVisible && this.tracks.isPresent; }
 
-  // Draws the opaque or the blended surfaces.
+  // Draws the opaque or the blended surfaces, and the outlines of toon surfaces.
   drawSurface(camera, lights, isBlended) {
     if (!this.isDrawn || !this.data.mesh) return;
-    const gl = this.gl, shows = this.joint >= 0;
-    const dim = this.data.opacity;
-    const common = { ...this.placing(camera), ...lights, u_color: this.data.color,
-      u_opacity: dim, u_flat: false, u_has_uv: "in_uv" in this.attributes,
-      u_has_colors: shows, u_has_tint: "in_tint" in this.attributes && !shows,
-      u_texture: 5, u_normal_map: 10 };
-    gl.bindVertexArray(this.surfaceArray);
-    for (const [index, first, count] of this.data.mesh.runs) {
-      const surface = index < 0 ? null : this.surfaces[index];
-      if (((surface && surface.isBlended) || dim < 1) !== isBlended) continue;
-      setUniforms(gl, this.surface, { ...common,
-        ...(surface ? surface.uniforms : { u_textured: false, u_has_base_factor: false,
-          u_alpha_mode: 0, u_normal_scale: 0, u_toon: false }),
+    const gl = this.gl, shows = this.joint >= 0, dim = this.data.opacity;
+    const common = { ...this.placing(camera), ...lights, ...this.samplers,
+      u_color: this.data.color, u_opacity: dim, u_flat: false,
+      u_has_uv: "in_uv" in this.attributes, u_has_colors: shows,
+      u_has_tint: "in_tint" in this.attributes && !shows };
+    const chosen = this.ranges.filter(({ surface }) => (surface.isBlended || dim < 1) === isBlended);
+    if (!chosen.length) return;
+    gl.frontFace(this.isMirrored ? gl.CW : gl.CCW);
+    // Blended surfaces write no depth, so their outlines are drawn below them.
+    if (isBlended && !shows) this.drawOutlines(chosen, common);
+    const shading = shows ? "phong" : this.data.mesh.shading;
+    const program = this.programs.get(`mesh-${shading}${this.macros}`);
+    const sorted = isBlended && dim === 1 ? this.sorted(camera) : { indices: this.indices, ranges: chosen };
+    gl.bindVertexArray(this.arrayOf(program, sorted.indices));
+    for (const { surface, first, count } of sorted.ranges) {
+      setUniforms(gl, program, { ...common, ...surface.uniforms,
         ...(shows ? { u_textured: false, u_has_base_factor: false, u_normal_scale: 0 } : {}) });
       this.bindTextures(surface);
-      (surface && !surface.isDoubleSided ? gl.enable : gl.disable).call(gl, gl.CULL_FACE);
+      (surface.isDoubleSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
       gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
     }
     gl.disable(gl.CULL_FACE);
+    if (!isBlended && !shows) this.drawOutlines(chosen, common);
+    gl.frontFace(gl.CCW);
     gl.bindVertexArray(null);
+  }
+
+  // Draws the back faces of surfaces that are moved along their normals.
+  drawOutlines(ranges, common) {
+    const outlined = ranges.filter(({ surface }) => surface.outline);
+    if (!outlined.length) return;
+    const gl = this.gl, program = this.programs.get("hull");
+    gl.bindVertexArray(this.arrayOf(program));
+    gl.enable(gl.CULL_FACE);
+    gl.cullFace(gl.FRONT);
+    for (const { surface, first, count } of outlined) {
+      const { uniforms, width } = surface.outline;
+      setUniforms(gl, program, { ...common, ...surface.uniforms, ...uniforms,
+        u_hull_width: uniforms.u_hull_on_screen ? width : width * this.scale });
+      this.bindTextures(surface);
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
+    }
+    gl.cullFace(gl.BACK);
+    gl.disable(gl.CULL_FACE);
+  }
+
+  // Blended triangles from the farthest to the nearest, and their surfaces; see material_runs.py.
+  sorted(camera) {
+    const gl = this.gl, { u_model_view: m } = this.placing(camera);
+    const along = [m[2], m[6], m[10]], key = along.join();
+    if (this.sortedFor === key) return this.order;
+    if (this.sortedFor === null) this.posedRows = this.readPosed();
+    this.sortedFor = key;
+    const rows = this.posedRows, depth = (v) =>
+      along[0] * rows[6 * v] + along[1] * rows[6 * v + 1] + along[2] * rows[6 * v + 2];
+    const total = this.blended.reduce((sum, { count }) => sum + count, 0);
+    const indices = new Uint32Array(total), ranges = [];
+    let at = 0;
+    for (const { surface, first, count } of this.blended) {
+      const depths = new Float64Array(count / 3);
+      for (let t = 0; t < depths.length; ++t)
+        for (let i = 0; i < 3; ++i) depths[t] += depth(this.triangles[first + 3 * t + i]);
+      const order = Uint32Array.from(depths, (_, t) => t).sort((a, b) => depths[a] - depths[b]);
+      ranges.push({ surface, first: at, count, mean: depths.reduce((a, b) => a + b, 0) / depths.length });
+      for (const t of order)
+        for (let i = 0; i < 3; ++i) indices[at++] = this.triangles[first + 3 * t + i];
+    }
+    ranges.sort((a, b) => a.mean - b.mean);
+    this.sortedIndices ??= gl.createBuffer();
+    gl.bindVertexArray(null);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.sortedIndices);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.DYNAMIC_DRAW);
+    this.order = { indices: this.sortedIndices, ranges };
+    return this.order;
   }
 
   // Draws every edge once, over the surface.

@@ -15,11 +15,13 @@ from viewer.data_classes import dataclass
 from viewer.exporters.html.offsets import Fields, principal_fields
 from viewer.exporters.html.packing import Packer
 from viewer.progress import report
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.figure import Figure
 from viewer.rigs.file_record import Json
 from viewer.rigs.geometry.quaternion import align_signs
 from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.material import Material
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
@@ -32,8 +34,30 @@ FINE = 2e-6
 float32, stay below 1e-5 of the size."""
 
 _EQUAL = 1e-9  # relative difference of lengths that counts as none
+_NORMAL_TOLERANCE = 2e-3  # of unit normals: 0.1 degrees
+_COARSEST_WEIGHT = 0.01
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
 _SCALE_STEP = 1e-7  # largest step of the scale of the whole figure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestSurface:
+    """The rest vertices of a figure in F poses, and their normals."""
+
+    shapes: Fields
+    correctives: Fields
+    """Displacements of the vertices by changing blend shapes, and by pose correctives."""
+    normals: Floats
+    """(V, 3). Rest normals of the frames that do not compute them from the changed surface."""
+    normal_fields: Fields
+    """Their displacements, if the blend shapes specify them."""
+    recomputed: Bools
+    """(F,). Whether a frame computes its rest normals from the surface without correctives."""
+
+    @property
+    def mean(self) -> Floats:
+        """Mean displacement (V, 3) of the vertices."""
+        return self.shapes.mean + self.correctives.mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +66,10 @@ class Tracks:
 
     rest: Figure
     """The figure in the shape of the first pose, whose joints the tracks move."""
-    offsets: Fields | None
-    """Displacements of its rest vertices, from those of ``rest`` without offsets; None without a
-    mesh."""
+    surface: RestSurface | None
+    """The surface that the joints move; None without a mesh."""
+    looks: dict[int, list[Material]]
+    """The materials of all frames, by their index, for those that blend shapes may change."""
     model: Floats
     """(F, 4). Translation and scale of the whole figure, after skinning."""
     rotations: Floats
@@ -82,55 +107,97 @@ def tracks_of(figure: Figure, poses: Sequence[Pose | None], how: Skinning) -> Tr
     align_signs(rotations)
     places = np.einsum("fjab,jb->fja", matrices[..., :3, :3], binds) + matrices[..., :3, 3]
     upper = stretches[:, *np.triu_indices(3)].reshape(len(poses), n_bound, 6)
-    fine = FINE * size_of(rest)
-    offsets = None if figure.mesh is None else _offsets(figure, poses, weights, how, fine)
-    return Tracks(rest, offsets, model, rotations, places, upper, joints)
+    surface = None if figure.mesh is None else _surface(figure, poses, weights, how)
+    looks = _looks(figure, weights)
+    return Tracks(rest, surface, looks, model, rotations, places, upper, joints)
 
 
-def _offsets(
+def _surface(
+    figure: Figure, poses: Sequence[Pose | None], weights: Sequence[Floats], how: Skinning
+) -> RestSurface:
+    """Return how blend shapes and pose correctives change the rest surface in each pose."""
+    rest, blend = shaped(figure, weights[0]), figure.blend_shapes
+    mesh, tolerance = rest.require_mesh(), FINE * size_of(rest)
+    normals, recomputed = mesh.normals, np.zeros(len(poses), np.bool_)
+    still = Fields(
+        np.zeros((mesh.n_vertices, 3)),
+        np.zeros((len(poses), 0)),
+        np.zeros((0, mesh.n_vertices, 3)),
+    )
+    if blend is None or all(np.array_equal(row, weights[0]) for row in weights):
+        correctives = _correctives(figure, poses, how, tolerance, True)
+        return RestSurface(still, correctives or still, normals, still, recomputed)
+    shapes = principal_fields(*_columns(blend, weights, BlendShapes.displacement), tolerance)
+    turns = still
+    if blend.normal_offsets is None:
+        # Like ``shaped``: without any weight, the surface has the normals of its file.
+        recomputed = np.array([row.any() for row in weights])
+        normals = normals if recomputed.all() else figure.require_mesh().normals
+    else:
+        columns = _columns(blend, weights, _normal_displacement)
+        turns = principal_fields(*columns, _NORMAL_TOLERANCE)
+        normals = normals + turns.mean
+    # Normals are computed from the surface without correctives, which a mean would be part of.
+    correctives = _correctives(figure, poses, how, tolerance, False)
+    return RestSurface(shapes, correctives or still, normals, turns, recomputed)
+
+
+_Linear = Callable[[Floats], Floats]
+
+
+def _columns(
+    blend: BlendShapes,
+    weights: Sequence[Floats],
+    displacement: Callable[[BlendShapes, Floats], Floats],
+) -> tuple[Floats, _Linear]:
+    """Return weights (F, P), and the linear displacement that they have from the first frame."""
+    if blend.is_linear and blend.rules is None:
+        return np.stack(weights) - weights[0], lambda some: displacement(blend, some)
+    # The displacement of each shape that occurs: rules and shape spaces need not be linear.
+    rows, row_of = np.unique(np.stack(weights), axis=0, return_inverse=True)
+    shapes, used = np.stack([displacement(blend, row) for row in rows]), row_of.reshape(-1)
+    shapes -= shapes[used[0]].copy()
+    return np.eye(len(rows))[used], lambda some: np.einsum("s,sva->va", some, shapes)
+
+
+def _normal_displacement(blend: BlendShapes, weights: Floats) -> Floats:
+    found = blend.normal_displacement(weights)
+    assert found is not None  # the shapes have offsets of normals
+    return found
+
+
+def _correctives(
     figure: Figure,
     poses: Sequence[Pose | None],
-    weights: Sequence[Floats],
     how: Skinning,
     tolerance: float,
-) -> Fields:
-    """Return how shapes and pose correctives displace the rest vertices in each pose."""
-    mesh, blend = figure.require_mesh(), figure.blend_shapes
-    columns, displacements = list[Floats](), list[Callable[[Floats], Floats]]()
-    changes = np.stack(weights) - weights[0]
-    if not changes.any() or blend is None:
-        pass  # the shape is that of ``rest``
-    elif blend.is_linear and blend.rules is None:
-        columns.append(changes)
-        displacements.append(blend.displacement)
-    else:
-        # The displacement of each shape that occurs: rules and shape spaces need not be linear.
-        rows, row_of = np.unique(np.stack(weights), axis=0, return_inverse=True)
-        shapes, used = np.stack([blend.displacement(row) for row in rows]), row_of.reshape(-1)
-        shapes -= shapes[used[0]].copy()
-        columns.append(np.eye(len(rows))[used])
-        displacements.append(lambda some: np.einsum("s,sva->va", some, shapes))
+    is_centered: bool,
+) -> Fields | None:
+    """Return how pose correctives displace the rest vertices in each pose."""
     correctives, skeleton = figure.correctives, figure.skeleton
-    if correctives is not None and skeleton is not None and how.correctives:
-        found = [
-            pose_weights(correctives, shaped_skeleton(figure, pose.shape_weights), pose)
-            for pose in poses
-            if pose is not None
-        ]
-        if len(found) == len(poses):
-            columns.append(np.stack(found))
-            displacements.append(correctives.displacement)
-    if not columns:
-        none = np.zeros((0, mesh.n_vertices, 3))
-        return Fields(np.zeros((mesh.n_vertices, 3)), np.zeros((len(poses), 0)), none)
-    edges = np.cumsum([each.shape[1] for each in columns])[:-1]
+    present = [pose for pose in poses if pose is not None]
+    if correctives is None or skeleton is None or not how.correctives:
+        return None
+    if len(present) < len(poses):
+        return None
+    found = [
+        pose_weights(correctives, shaped_skeleton(figure, pose.shape_weights), pose)
+        for pose in present
+    ]
+    return principal_fields(np.stack(found), correctives.displacement, tolerance, is_centered)
 
-    def displacement(some: Floats) -> Floats:
-        parts = zip(displacements, np.split(some, edges), strict=True)
-        total: Floats = np.sum([displace(own) for displace, own in parts], axis=0)
-        return total
 
-    return principal_fields(np.concatenate(columns, axis=1), displacement, tolerance)
+def _looks(figure: Figure, weights: Sequence[Floats]) -> dict[int, list[Material]]:
+    """Return the materials that blend shapes may change, in all frames."""
+    blend = figure.blend_shapes
+    if figure.mesh is None or blend is None or blend.material_binds is None:
+        return {}
+    materials, binds = figure.mesh.materials, blend.material_binds
+    changed = [binds.changed(materials, blend.shown(row)) for row in weights]
+    return {
+        index: [each.get(index, materials[index]) for each in changed]
+        for index in sorted({index for each in changed for index in each})
+    }
 
 
 def size_of(figure: Figure) -> float:
@@ -177,14 +244,40 @@ def pack_tracks(tracks: Tracks, packer: Packer) -> Json:
     is_bound = tracks.joints.shape == tracks.places.shape
     if n_joints and not (is_bound and np.abs(tracks.joints - tracks.places).max() <= 0.5 * fine):
         motion["joints"] = packer.add(tracks.joints, fine)
-    if tracks.offsets is not None and len(tracks.offsets.fields):
-        fields = tracks.offsets.fields
-        count = len(fields)
-        largest = np.abs(fields).max(axis=(1, 2))
-        # Errors of K fields add up at random, as the square root of K.
-        motion["weights"] = packer.add(
-            tracks.offsets.weights, np.minimum(fine / (np.sqrt(count) * largest), 0.01)
-        )
-        rows = np.moveaxis(fields, 0, 1).reshape(fields.shape[1], -1)
-        motion["fields"] = packer.add(rows, fine / np.sqrt(count))
+    if tracks.surface is not None:
+        _pack_surface(tracks.surface, fine, packer, motion)
     return motion
+
+
+def _pack_surface(surface: RestSurface, fine: float, packer: Packer, motion: Json) -> None:
+    """Add what changes the rest surface to the members of the figure's ``motion``."""
+    both = surface.shapes, surface.correctives
+    fields = np.concatenate([each.fields for each in both])
+    if len(fields):
+        weights = np.concatenate([each.weights for each in both], axis=1)
+        motion["nShapes"] = len(surface.shapes.fields)
+        _pack_fields(("weights", "fields"), weights, fields, fine, packer, motion)
+    turns = surface.normal_fields
+    if len(turns.fields):
+        names = "normalWeights", "normalFields"
+        _pack_fields(names, turns.weights, turns.fields, _NORMAL_TOLERANCE, packer, motion)
+    if surface.recomputed.any():
+        motion["recomputed"] = packer.add(surface.recomputed)
+
+
+def _pack_fields(
+    names: tuple[str, str],
+    weights: Floats,
+    fields: Floats,
+    fine: float,
+    packer: Packer,
+    motion: Json,
+) -> None:
+    """Add weights (F, K) and fields (K, V, 3) whose sums may have errors of ``fine``."""
+    count, largest = len(fields), np.abs(fields).max(axis=(1, 2))
+    # Errors of K fields add up at random, as the square root of K.
+    steps = np.full(count, _COARSEST_WEIGHT)
+    np.divide(fine, np.sqrt(count) * largest, out=steps, where=largest > 0.0)
+    motion[names[0]] = packer.add(weights, np.minimum(steps, _COARSEST_WEIGHT))
+    rows = np.moveaxis(fields, 0, 1).reshape(fields.shape[1], -1)
+    motion[names[1]] = packer.add(rows, fine / np.sqrt(count))

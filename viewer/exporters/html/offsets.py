@@ -32,13 +32,17 @@ class Fields:
 
 
 def principal_fields(
-    weights: Floats, displacement: Callable[[Floats], Floats], tolerance: float
+    weights: Floats,
+    displacement: Callable[[Floats], Floats],
+    tolerance: float,
+    is_centered: bool = True,
 ) -> Fields:
     """Return the fewest fields that reproduce ``displacement`` of weights (F, P), which is linear.
 
-    The errors of all vertices in all frames are below ``tolerance``.
+    The errors of all vertices in all frames are below ``tolerance``. The mean is 0 if not
+    ``is_centered``.
     """
-    middle = weights.mean(axis=0)
+    middle = weights.mean(axis=0) * is_centered
     mean = displacement(middle)
     # C = U S W: the rows of W, orthonormal, span the weights that occur, so that each of them needs
     # to be displaced only once, and X = (U S) D with D = displacement(W) has all frames.

@@ -25,8 +25,9 @@ class Page {
     const programs = new Programs(gl, this.header.programs);
     this.stage = new Stage(gl, programs, this.header);
     const ramp = Float32Array.from(this.arrays[this.header.ramp].values);
-    this.figures = this.header.figures.map((data) =>
-      new Figure(gl, programs, data, this.arrays, ramp));
+    const { figures, samplers, studio } = this.header;
+    this.figures = figures.map((data) => new Figure(gl, programs, data, this.arrays, ramp, samplers));
+    if (studio) useStudio(gl, studio, this.arrays, samplers);
     this.end = Math.max(0, ...this.figures.map((figure) => figure.tracks.end));
     this.posedAt = null;
   }
@@ -96,7 +97,8 @@ class Page {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     this.stage.drawBackground();
-    const lights = { ...this.header.lights, ...shadow, u_up: this.camera.up };
+    const lights = { ...this.header.lights, ...shadow, u_up: this.camera.up,
+      u_to_studio: this.camera.toStudio };
     if (shows("surface")) for (const each of this.figures) each.drawSurface(this.camera, lights, false);
     if (shows("wireframe")) for (const each of this.figures) each.drawEdges(this.camera);
     if (casters.length) this.stage.drawShadow(this.camera, shadow);
@@ -167,10 +169,10 @@ class Page {
     actions[event.key]();
   }
 
-  // Positions of a figure's vertices at the current time, in its own space.
-  positions(index) {
+  // Positions and unit normals of a figure's vertices at the current time, in its own space.
+  vertices(index) {
     this.pose();
-    return this.figures[index].posedPositions();
+    return this.figures[index].posedVertices();
   }
 }
 
@@ -187,5 +189,6 @@ window.viewer = {
   ready,
   seek: (time) => ready.then((page) => page.seek(time)),
   play: (starts = true) => ready.then((page) => page.play(starts)),
-  positions: (index = 0) => ready.then((page) => page.positions(index)),
+  positions: (index = 0) => ready.then((page) => page.vertices(index).positions),
+  normals: (index = 0) => ready.then((page) => page.vertices(index).normals),
 };

@@ -7,7 +7,8 @@ class Tracks {
     this.skin = figure.skin;
     this.arrays = {};
     for (const name of
-      ["model", "rotations", "places", "stretches", "joints", "weights", "fields", "present"])
+      ["model", "rotations", "places", "stretches", "joints", "weights", "fields", "present",
+        "normalWeights", "normalFields", "recomputed"])
       if (name in this.motion) this.arrays[name] = arrays[this.motion[name]];
   }
 
@@ -27,9 +28,17 @@ class Tracks {
       (this.motion.holds || Math.abs(asked - frame) < 0.5);
   }
 
+  // Whether the rest normals are those of the changed surface, in a frame beside the current time.
+  get isRecomputed() {
+    const values = this.arrays.recomputed?.values, after = this.part === 0 ? 0 : 1;
+    return Boolean(values && (values[this.frame] > 0.5 || values[this.frame + after] > 0.5));
+  }
+
   // Values of a track at the current time.
-  at(name) {
-    const { columns, values } = this.arrays[name], found = new Float64Array(columns);
+  at(name) { return this.between(this.arrays[name]); }
+
+  between({ columns, values }) {
+    const found = new Float64Array(columns);
     const first = this.frame * columns, part = this.part;
     for (let c = 0; c < columns; ++c) {
       const low = values[first + c];
@@ -50,7 +59,7 @@ class Tracks {
     const { binds, fractions } = this.skin, n = fractions.length;
     const linear = new Float64Array(9 * n), moved = new Float64Array(3 * n);
     const rotations = new Float64Array(9 * n), center = [0, 0, 0];
-    let total = 0;
+    let total = 0, orientation = 0;
     for (let j = 0; j < n; ++j) {
       const q = normalized(turns.subarray(4 * j, 4 * j + 4));
       turns.set(q, 4 * j);
@@ -65,8 +74,10 @@ class Tracks {
         center[row] += fractions[j] * moved[3 * j + row];
       }
       total += fractions[j];
+      const [a, b, c] = [0, 3, 6].map((column) => Array.from(A.slice(column, column + 3)));
+      orientation += fractions[j] * Math.sign(dot(a, cross(b, c)));
     }
-    return { n, linear, moved, rotations, turns, places, stretches, restCenter,
+    return { n, linear, moved, rotations, turns, places, stretches, restCenter, orientation,
       center: total > 0 ? center : [...restCenter] };
   }
 
@@ -107,16 +118,37 @@ class Tracks {
   }
 }
 
-// Adds the weighted fields of offsets to rest positions, both (V, 3).
-function addOffsets(rest, weights, fields) {
-  const found = Float64Array.from(rest), count = weights.length;
-  for (let v = 0; v < rest.length / 3; ++v)
-    for (let k = 0; k < count; ++k) {
+// Adds some of the weighted fields of offsets to rows of three numbers.
+function addOffsets(rows, weights, fields, first, last = weights.length) {
+  if (last <= first) return rows;
+  const found = Float64Array.from(rows), count = weights.length, { values } = fields;
+  for (let v = 0; v < rows.length / 3; ++v)
+    for (let k = first; k < last; ++k) {
       const at = 3 * (v * count + k), weight = weights[k];
-      found[3 * v] += weight * fields[at];
-      found[3 * v + 1] += weight * fields[at + 1];
-      found[3 * v + 2] += weight * fields[at + 2];
+      found[3 * v] += weight * values[at];
+      found[3 * v + 1] += weight * values[at + 1];
+      found[3 * v + 2] += weight * values[at + 2];
     }
+  return found;
+}
+
+// Normals of vertices, triangles weighted by area: vertex_normals of mesh.py. Vertices that are
+// split along texture seams share the normal of their source.
+function surfaceNormals(positions, triangles, sources) {
+  const found = new Float64Array(positions.length);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [sources[triangles[t]], sources[triangles[t + 1]], sources[triangles[t + 2]]];
+    const bx = positions[3 * b] - positions[3 * a], cx = positions[3 * c] - positions[3 * a];
+    const by = positions[3 * b + 1] - positions[3 * a + 1], cy = positions[3 * c + 1] - positions[3 * a + 1];
+    const bz = positions[3 * b + 2] - positions[3 * a + 2], cz = positions[3 * c + 2] - positions[3 * a + 2];
+    const [x, y, z] = [by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx];
+    for (const v of [a, b, c]) { found[3 * v] += x; found[3 * v + 1] += y; found[3 * v + 2] += z; }
+  }
+  for (let v = 0; v < found.length; v += 3) {
+    const length = Math.hypot(found[v], found[v + 1], found[v + 2]);
+    if (length === 0) found[v + 1] = 1;
+    else for (let i = 0; i < 3; ++i) found[v + i] /= length;
+  }
   return found;
 }
 
@@ -167,6 +199,11 @@ function normalMatrix(m) {
   const sign = dot(a, columns[0]) < 0 ? -1 : 1;
   const size = Math.max(...columns.flat().map(Math.abs)) || 1;
   return columns.flat().map((x) => (sign * x) / size);
+}
+
+// The determinant of the linear part of a 4 x 4 matrix.
+function determinant(m) {
+  return dot(m.slice(0, 3), cross(m.slice(4, 7), m.slice(8, 11)));
 }
 
 function cross(a, b) {

@@ -16,12 +16,17 @@ STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
 _SRGB8 = 0x8C41
 
 
+def studio_arrays() -> tuple[np.ndarray, np.ndarray]:
+    """Return the light (layers, side, side, 3) and the table (64, 64, 2), float16."""
+    with np.load(resource("assets", "studio", "studio.npz")) as stored:
+        return stored["light"], stored["split_sum"]
+
+
 class Studio:
     """Prefiltered studio environment, and the lookup table of the split-sum approximation."""
 
     def __init__(self, context: moderngl.Context) -> None:
-        with np.load(resource("assets", "studio", "studio.npz")) as stored:
-            light, table = stored["light"], stored["split_sum"]
+        light, table = studio_arrays()
         self._owner = Owner()
         with self._owner.guard():
             layers, height, width = light.shape[:3]

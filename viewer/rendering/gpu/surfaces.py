@@ -73,8 +73,8 @@ class Surface:
 
     def changed(self, material: Material) -> Surface:
         """Return the surface with the colours and placements of a changed material."""
-        values = {**_colors(material), "u_places": _places(material)}
-        return replace(self, uniforms={**self.uniforms, **values}, outline=material.outline)
+        uniforms = {**self.uniforms, **changing_uniforms(material)}
+        return replace(self, uniforms=uniforms, outline=material.outline)
 
 
 def needs_materials(mesh: Mesh) -> bool:
@@ -116,11 +116,10 @@ def upload_surfaces(
     surfaces = []
     for material in materials:
         found: dict[str, moderngl.Texture] = {}
-        is_toon = material.shade_color is not None
         for name, texture in drawn_textures(material).items():
             if texture.image is None or texture.uv_set not in sets:
                 continue
-            is_linear = name not in (*_COLORS, *((_MATCAP, _RIM) if is_toon else ()))
+            is_linear = has_linear_texels(material, name)
             filters = texture.is_smooth, texture.minification
             key = id(texture.image), is_linear, texture.wrap, filters
             if key not in made:
@@ -159,6 +158,12 @@ def joined_image(image: Bytes, wrap: tuple[str, str]) -> Bytes:
     return image
 
 
+def has_linear_texels(material: Material, name: str) -> bool:
+    """Return whether the texture of a slot has numbers instead of sRGB colours."""
+    is_toon = material.shade_color is not None
+    return name not in (*_COLORS, *((_MATCAP, _RIM) if is_toon else ()))
+
+
 def drawn_textures(material: Material) -> dict[str, Texture]:
     """Return the drawn textures, by the field of the material whose texture unit they use."""
     if material.shade_color is None:
@@ -186,7 +191,6 @@ def surface_uniforms(
         "u_has_base_factor": material.base_color is not None,
         "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
         "u_alpha_cutoff": material.alpha_cutoff,
-        "u_places": _places(material),
         "u_uv_sets": np.array(slots, dtype="i4").tobytes(),
         "u_channels": channels.tobytes(),
         "u_has_metallic_map": "metallic_texture" in textures,
@@ -200,7 +204,7 @@ def surface_uniforms(
         "u_toon": material.shade_color is not None,
         "u_shade_range": material.shade_range,
         "u_has_shade_map": "shade_texture" in textures,
-        **_colors(material),
+        **changing_uniforms(material),
     }
     if material.rim is not None:
         rim = material.rim
@@ -210,8 +214,8 @@ def surface_uniforms(
     return values
 
 
-def _colors(material: Material) -> dict[str, object]:
-    """Return the uniforms of the colours that expressions may change."""
+def changing_uniforms(material: Material) -> dict[str, object]:
+    """Return the uniforms that expressions may change: colours, and placements of textures."""
     rim = material.rim or Rim()
     return {
         "u_base_factor": material.base_color or (1.0, 1.0, 1.0, 1.0),
@@ -220,6 +224,22 @@ def _colors(material: Material) -> dict[str, object]:
         "u_has_rim": rim.has_effect,
         "u_rim_color": rim.color,
         "u_matcap_factor": rim.matcap_factor,
+        "u_places": np.stack([_place(texture) for texture in _placed(material)]).tobytes(),
+    }
+
+
+def outline_uniforms(outline: Outline, uniforms: dict[str, Any], has_map: bool) -> dict[str, Any]:
+    """Return the uniforms of an outline, but its width; ``uniforms``: those of its surface."""
+    places = np.frombuffer(uniforms["u_places"], "f4").reshape(-1, 9)
+    slot = TEXTURES.index(_WIDTH)
+    return {
+        "u_outline_color": outline.color,
+        "u_outline_mix": outline.mix,
+        "u_hull_on_screen": outline.mode == "screen",
+        "u_has_width_map": has_map,
+        "u_width_map": list(SAMPLERS.values())[slot],
+        "u_width_place": places[slot].tobytes(),
+        "u_width_set": int(np.frombuffer(uniforms["u_uv_sets"], "i4")[slot]),
     }
 
 
@@ -227,11 +247,6 @@ def _placed(material: Material) -> list[Texture]:
     """Return the texture of each unit; one without pixels for unused units."""
     slots = drawn_textures(material)
     return [slots.get(name) or Texture("") for name in TEXTURES]
-
-
-def _places(material: Material) -> bytes:
-    """Return the transforms of the textures of all units."""
-    return np.stack([_place(texture) for texture in _placed(material)]).tobytes()
 
 
 def _place(texture: Texture) -> np.ndarray:

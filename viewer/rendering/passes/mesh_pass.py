@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import moderngl
-import numpy as np
 
 from viewer.rendering.gpu.back_faces import Region
 from viewer.rendering.gpu.draw_state import draw_nearest
@@ -15,14 +14,14 @@ from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
-from viewer.rendering.gpu.surfaces import SAMPLERS, Surface
+from viewer.rendering.gpu.surfaces import SAMPLERS, Surface, outline_uniforms
 from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
 from viewer.rendering.options import Color, DisplayOptions, Shading
 from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.transform import mean_scale
-from viewer.rigs.material import TEXTURES, Outline
+from viewer.rigs.material import Outline
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.units import METRES
 
@@ -34,7 +33,6 @@ _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # length of drawn normals, relative to the figure's size
 _COLORMAP_UNIT = 6
-_WIDTH_SLOT = TEXTURES.index("occlusion_texture")  # texture of an outline's width
 
 
 class MeshPass:
@@ -301,17 +299,7 @@ def _hull_uniforms(
     surface: Surface, outline: Outline, scale: float, textured: bool
 ) -> dict[str, object]:
     """Return the uniforms of an outline; ``scale``: camera units per metre."""
-    values, unit = surface.uniforms, SAMPLERS["u_occlusion_map"]
+    unit, factor = SAMPLERS["u_occlusion_map"], 1.0 if outline.mode == "screen" else scale
     has_map = textured and any(used == unit for used, _ in surface.textures)
-    places = np.frombuffer(values["u_places"], "f4").reshape(-1, 9)
-    on_screen = outline.mode == "screen"
-    return {
-        "u_outline_color": outline.color,
-        "u_outline_mix": outline.mix,
-        "u_hull_width": outline.width * (1.0 if on_screen else scale),
-        "u_hull_on_screen": on_screen,
-        "u_has_width_map": has_map,
-        "u_width_map": unit,
-        "u_width_place": places[_WIDTH_SLOT].tobytes(),
-        "u_width_set": int(np.frombuffer(values["u_uv_sets"], "i4")[_WIDTH_SLOT]),
-    }
+    values = outline_uniforms(outline, surface.uniforms, has_map)
+    return {**values, "u_hull_width": factor * outline.width}
