@@ -1,10 +1,25 @@
 """Viewer, checker and converter of skinned characters.
 
 >>> import viewer
->>> scene = viewer.load()                                  # the bundled figure
->>> image = viewer.render(scene, size=(320, 240))
->>> image.shape
+>>> scene = viewer.load("fox")                             # files or names, as on the command line
+>>> fox = scene["fox"]                                     # an actor: figure, pose, placement
+>>> fox["head"] = [0.4, 0.0, 0.0]                          # a rotation vector, radians
+>>> fox.vertices().shape                                   # (F, V, 3) of all frames
+(1, 7561, 3)
+>>> viewer.render(scene, size=(320, 240)).shape            # (H, W, 4) uint8
 (240, 320, 4)
+
+Open and show      load, show, render, video
+Arrays             Actor.vertices, .joints, .at, motion, deform, deform_frames, joint_matrices
+Your own arrays    figure, animate
+Files              export, write
+Change             retarget, clean, rig, shaped, with_rest_mesh, mirror_pose, onion
+Check and compare  lint, diff, pose_errors
+Many files         batch
+
+Each has its own help, such as ``help(viewer.retarget)``. ``viewer help python`` shows the page of
+the manual, ``viewer help examples`` scripts to start from. Errors that a user can act on are
+``ViewerError`` with a message of one line.
 
 Importing this package is cheap: each name loads its own module on first use.
 """
@@ -20,8 +35,13 @@ if TYPE_CHECKING:
     from viewer.app.window import show
     from viewer.batching.report import Report
     from viewer.commands._batch.calling import batch
+    from viewer.commands._cleanup import clean
     from viewer.commands._exports import export
     from viewer.commands._pictures import render, video
+    from viewer.commands._retarget import retarget
+    from viewer.commands.diff import Comparison, diff
+    from viewer.commands.lint import Findings, lint
+    from viewer.commands.rig import rig
     from viewer.errors import ViewerError
     from viewer.formats import write
     from viewer.loading import load
@@ -53,8 +73,10 @@ __all__ = [
     "Camera",
     "Channel",
     "Clip",
+    "Comparison",
     "DisplayOptions",
     "Figure",
+    "Findings",
     "Light",
     "Lights",
     "Material",
@@ -73,12 +95,15 @@ __all__ = [
     "animate",
     "apply_record",
     "batch",
+    "clean",
     "deform",
     "deform_frames",
+    "diff",
     "evaluate",
     "export",
     "figure",
     "joint_matrices",
+    "lint",
     "load",
     "mirror_pose",
     "motion",
@@ -87,6 +112,8 @@ __all__ = [
     "record_of",
     "render",
     "rest_pose",
+    "retarget",
+    "rig",
     "sample",
     "shaped",
     "show",
@@ -101,8 +128,10 @@ _HOMES = {
     "Camera": "rendering.camera",
     "Channel": "rigs.motion.clip",
     "Clip": "rigs.motion.clip",
+    "Comparison": "commands.diff",
     "DisplayOptions": "rendering.options",
     "Figure": "rigs.figure",
+    "Findings": "commands.lint",
     "Light": "rendering.options",
     "Lights": "rendering.options",
     "Material": "rigs.material",
@@ -121,12 +150,15 @@ _HOMES = {
     "animate": "loading.own_arrays",
     "apply_record": "rigs.posing.pose_record",
     "batch": "commands._batch.calling",
+    "clean": "commands._cleanup",
     "deform": "rigs.skinning",
     "deform_frames": "rigs.skinning",
+    "diff": "commands.diff",
     "evaluate": "rigs.motion.clip",
     "export": "commands._exports",
     "figure": "loading.own_arrays",
     "joint_matrices": "rigs.skinning",
+    "lint": "commands.lint",
     "load": "loading",
     "mirror_pose": "rigs.retargeting.mirror",
     "motion": "rigs.motion.motion_arrays",
@@ -135,6 +167,8 @@ _HOMES = {
     "record_of": "rigs.posing.pose_record",
     "render": "commands._pictures",
     "rest_pose": "rigs.pose",
+    "retarget": "commands._retarget",
+    "rig": "commands.rig",
     "sample": "rigs.motion.clip",
     "shaped": "rigs.shape",
     "show": "app.window",

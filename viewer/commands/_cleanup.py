@@ -1,21 +1,51 @@
-"""Options that clean up captured motions."""
+"""Options that clean up captured motions, and ``viewer.clean``, which does the same."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from typing import TYPE_CHECKING
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from viewer.commands._frames import parse_range, rate
+from viewer.commands._keywords import arguments_of, without_dashes
 from viewer.commands._settings import add_settings, settings_of
+from viewer.errors import ViewerError
 from viewer.loading.settings import CleanUp
 from viewer.phrases import printable
+from viewer.rigs.scene import Actor, Scene, scene_of
 
 if TYPE_CHECKING:
     from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 _LONGEST_WINDOW = 9999
 _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "order")}
+
+# Values of --gaps, by the use of the command: pattern, help and metavariable.
+_ONE_SECOND = 1.0  # the longest gap if the deprecated --fill-gaps has no value
+_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
+_PATTERNS = {
+    "view": _LIMIT % "",
+    "check": "interpolate",
+    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
+}
+_WHAT = {
+    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
+    "check": "gaps in captures: interpolate all",
+    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
+    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
+    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
+    "other formats hold poses)",
+}
+_METAVAR = {
+    "view": "interpolate[:N|:Ns]",
+    "check": "interpolate",
+    "write": "hold|split|interpolate[:N|:Ns]",
+}
+
+GapUse: TypeAlias = Literal["view", "check", "write"]
 
 
 def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +69,51 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         frames = span.first, span.stop
     gap = {} if arguments.fill_gaps is None else {"longest_gap": arguments.fill_gaps}
     return settings_of(CleanUp, arguments, frames=frames, interpolates=bool(gap), **gap)
+
+
+def clean(what: Scene | Actor, **options: object) -> Scene:
+    """Clean up captured motions, or those of your own arrays, as ``viewer convert`` does.
+
+    Parameters
+    ----------
+    what : Scene or Actor
+        Unchanged; the result has copies of its actors.
+    **options
+        Options of the command with underscores, applied in this order: ``merge_ids`` (``[1, 4]``),
+        ``gaps`` (``"interpolate"``, or ``"interpolate:10"`` frames), ``smooth`` (True,
+        ``"savgol:window=7"``, ``"one-euro"``), ``lock_feet``, ``ground``, ``trim`` (a range of
+        frames) and ``resample`` (frames per second).
+
+    Returns
+    -------
+    Scene
+        With the new motions; its ``diagnostics`` end with what was changed, and how far.
+
+    Raises
+    ------
+    ViewerError
+        If there is no such option or value, or nothing is requested.
+    RigError
+        If no motion has frames.
+    """
+    from viewer.loading.cleaning import clean_up
+
+    arguments = arguments_of("clean", _add_clean_arguments, options)
+    with without_dashes():
+        wanted = clean_up_of(arguments)
+    if arguments.interpolate_gaps:  # however long they are
+        wanted = replace(wanted, interpolates=True, longest_gap=sys.maxsize)
+    if wanted.is_empty:
+        raise ViewerError("clean: expected an option such as smooth or lock_feet, found none")
+    scene = scene_of(what, "clean")
+    scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
+    notes = clean_up(scene, wanted)
+    return replace(scene, diagnostics=(*scene.diagnostics, *notes))
+
+
+def _add_clean_arguments(parser: argparse.ArgumentParser) -> None:
+    add_cleanup_arguments(parser)
+    add_gap_arguments(parser.add_argument_group("gaps"), "view")
 
 
 def _people(text: str) -> tuple[int, ...]:
@@ -95,3 +170,56 @@ def _savgol(values: dict[str, float]) -> SavitzkyGolay:
             f"savgol: expected an integer order from 0 to 9, less than the window, found {order:g}"
         )
     return SavitzkyGolay(int(window), int(order))
+
+
+def add_gap_arguments(group: argparse._ArgumentGroup, use: GapUse) -> None:
+    """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
+
+    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``. Parsing sets
+    ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps are
+    interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an integer or
+    seconds as a float, or None.
+    """
+    group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
+    hidden = argparse.SUPPRESS
+    group.add_argument("--interpolate-gaps", action="store_true", help=hidden)
+    if use == "check":
+        return
+    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=_ONE_SECOND, help=hidden)
+
+
+class _Gaps(argparse.Action):
+    """Parses the value of ``--gaps`` into the results of all three options."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[object] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Store the results, or raise ArgumentError."""
+        text, use = str(values), str(self.const)
+        found = re.fullmatch(_PATTERNS[use], text)
+        if found is None:
+            raise argparse.ArgumentError(
+                self, f"expected {_METAVAR[use]}, found {printable(text, 60)}"
+            )
+        parts = found.groupdict()
+        namespace.gaps = parts.get("alone") or parts.get("rest")
+        limit = parts.get("limit")
+        namespace.interpolate_gaps = limit is None and parts.get("alone") is None
+        if use != "check":
+            is_time = limit is not None and limit.endswith("s")
+            longest = float(limit[:-1]) if limit is not None and is_time else int(limit or 0)
+            namespace.fill_gaps = None if limit is None else longest
+
+
+def _longest(text: str) -> int:
+    """Return the length of the longest gap in frames."""
+    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(
+            f"expected a number of frames, or no value and the files before the option, found "
+            f"{printable(text, 60)}"
+        )
+    return int(text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from viewer.commands._scene import SceneOptions
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, scene_of
 from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
@@ -72,7 +72,8 @@ def export(
     OutputError
         If a file cannot be written, or is one of those that were opened.
     """
-    from viewer.commands._pictures import scene_at, scene_of, without_dashes
+    from viewer.commands._keywords import without_dashes
+    from viewer.commands._pictures import scene_at
     from viewer.commands.convert import check_outputs, selected
     from viewer.exporters import ExportOptions, export, output_files
 

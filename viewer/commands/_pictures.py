@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from viewer.commands._frames import numbering_of
+from viewer.commands._keywords import without_dashes
 from viewer.commands._scalar import scalar_notes
 from viewer.commands._scene import SceneOptions
 from viewer.commands._sequence import Request, parse_turntable
@@ -24,9 +22,7 @@ from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.offscreen import render as draw
 from viewer.rendering.options import SIZE, DisplayOptions, Quality
 from viewer.rigs.arrays import Bytes
-from viewer.rigs.scene import Actor, Scene, pose_actors, scene_points
-
-_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_of, scene_points
 
 
 def render(
@@ -207,17 +203,6 @@ def video(
         )
 
 
-def scene_of(what: Scene | Actor, name: str) -> Scene:
-    """Return a scene of what a function was given; ``name``: of the function, for errors."""
-    if isinstance(what, Scene):
-        return what
-    if not isinstance(what, Actor):
-        raise ViewerError(f"{name}: expected a scene or an actor, found {type(what).__name__}")
-    files = [origin.path for origin in what.figure.origins]
-    files += [] if what.clip_origin is None else [what.clip_origin[0]]
-    return Scene([what], files=files)
-
-
 def scene_at(scene: Scene, time: float) -> Scene:
     """Return a copy of a scene, posed at a time that its motions reach."""
     if not math.isfinite(time):
@@ -253,19 +238,6 @@ def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
     notes = scalar_notes(scene, options)
     if notes:
         raise ViewerError(notes[0])
-
-
-@contextmanager
-def without_dashes() -> Iterator[None]:
-    """Name settings in errors as in Python: messages of the command name its options."""
-    try:
-        yield
-    except ViewerError as problem:
-        text = str(problem).removeprefix("--scalar ")
-        named = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
-        if named == str(problem):
-            raise
-        raise type(problem)(named) from None
 
 
 def check_choices(options: DisplayOptions) -> None:

@@ -12,9 +12,9 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING
 
-from viewer.commands._cleanup import clean_up_of
+from viewer.commands._cleanup import GapUse, add_gap_arguments, clean_up_of
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
 from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
@@ -27,7 +27,7 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
-from viewer.phrases import all_of, printable
+from viewer.phrases import all_of
 from viewer.progress import report
 from viewer.rigs.scene import Scene
 from viewer.streams import summary_stream
@@ -42,29 +42,6 @@ _MOST_MODELS = 12  # maximum number of names in a message
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of writable image formats."""
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}  # suffixes of sizes, bytes
-# Values of --gaps, by the use of the command: pattern, help and metavariable.
-_ONE_SECOND = 1.0  # the longest gap if the deprecated --fill-gaps has no value
-_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
-_PATTERNS = {
-    "view": _LIMIT % "",
-    "check": "interpolate",
-    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
-}
-_WHAT = {
-    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
-    "check": "gaps in captures: interpolate all",
-    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
-    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
-    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
-    "other formats hold poses)",
-}
-_METAVAR = {
-    "view": "interpolate[:N|:Ns]",
-    "check": "interpolate",
-    "write": "hold|split|interpolate[:N|:Ns]",
-}
-
-GapUse: TypeAlias = Literal["view", "check", "write"]
 
 
 @dataclass(slots=True)
@@ -148,12 +125,17 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: GapUse = "check
     group = parser.add_argument_group("captures and BVH")
     add_settings(group, MotionSettings, "model", "gender")
     add_settings(group, SceneOptions, "motion_files")
-    add_settings(group, MotionSettings, "source_rest", type=_source_rest)
-    add_settings(group, MotionSettings, "feet", "hand_contact")
+    add_driving_arguments(group)
     add_settings(group, SceneOptions, "joint_map")
     names = "up", "unit", "images", "video", "space", "average_shape", "layout"
     add_settings(group, MotionSettings, *names, "legacy_expression", "drives")
     add_gap_arguments(group, gaps)
+
+
+def add_driving_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options that control how motions drive figures."""
+    add_settings(group, MotionSettings, "source_rest", type=_source_rest)
+    add_settings(group, MotionSettings, "feet", "hand_contact")
 
 
 def _source_rest(text: str) -> int | str:
@@ -294,56 +276,3 @@ def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warn
         if not note_found(warning, plain):
             severity = warning.severity if isinstance(warning, Diagnostic) else plain
             print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)
-
-
-def add_gap_arguments(group: argparse._ArgumentGroup, use: GapUse) -> None:
-    """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
-
-    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``. Parsing sets
-    ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps are
-    interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an integer or
-    seconds as a float, or None.
-    """
-    group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
-    hidden = argparse.SUPPRESS
-    group.add_argument("--interpolate-gaps", action="store_true", help=hidden)
-    if use == "check":
-        return
-    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=_ONE_SECOND, help=hidden)
-
-
-class _Gaps(argparse.Action):
-    """Parses the value of ``--gaps`` into the results of all three options."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[object] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Store the results, or raise ArgumentError."""
-        text, use = str(values), str(self.const)
-        found = re.fullmatch(_PATTERNS[use], text)
-        if found is None:
-            raise argparse.ArgumentError(
-                self, f"expected {_METAVAR[use]}, found {printable(text, 60)}"
-            )
-        parts = found.groupdict()
-        namespace.gaps = parts.get("alone") or parts.get("rest")
-        limit = parts.get("limit")
-        namespace.interpolate_gaps = limit is None and parts.get("alone") is None
-        if use != "check":
-            is_time = limit is not None and limit.endswith("s")
-            longest = float(limit[:-1]) if limit is not None and is_time else int(limit or 0)
-            namespace.fill_gaps = None if limit is None else longest
-
-
-def _longest(text: str) -> int:
-    """Return the length of the longest gap in frames."""
-    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
-        raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or no value and the files before the option, found "
-            f"{printable(text, 60)}"
-        )
-    return int(text)

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from viewer.commands._frames import parse_range
 from viewer.commands._input_files import input_files
+from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._pose import add_skinning_arguments
 from viewer.commands._printing import table_lines
 from viewer.commands._progress import shown_progress
@@ -26,19 +27,21 @@ from viewer.commands._scene import PICTURES, print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, described, note
-from viewer.diagnostics.record import is_recorded, note_values
-from viewer.errors import UnsupportedFormatError, ViewerError
+from viewer.diagnostics.record import JsonObject, is_recorded, note_values
+from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
 from viewer.phrases import brief, printable, rounded
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.comparison import Difference, Measure, MeasureKind, compare
+from viewer.rigs.comparison.pose_errors import PoseErrors, pose_errors
 from viewer.rigs.comparison.steps import FrameRange
 from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.clip import Clip, suits
+from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.scalars import length_unit
-from viewer.rigs.scene import Actor, Motion, Scene
+from viewer.rigs.scene import Actor, Motion, Scene, scene_of
 from viewer.rigs.skinning import Skinning
 from viewer.rigs.units import METRES
 from viewer.streams import require_stdout, summary_stream
@@ -53,6 +56,15 @@ _COLUMNS = {
     "vertices": ("vertices", "surface, from the first", "surface, from the second"),
     "weights": ("weights",),
 }
+# Errors of motions: name and unit.
+_ERRORS = {
+    "mpjpe": ("MPJPE", "mm"),
+    "pa_mpjpe": ("PA-MPJPE", "mm"),
+    "pve": ("PVE", "mm"),
+    "acceleration": ("acceleration", "mm/s\N{SUPERSCRIPT TWO}"),
+    "foot_skate": ("foot skate", "mm/frame"),
+}
+_NOISE = 1e-6  # millimetres; rounding errors of bodies are below
 # Heat maps: size of one, size of a sheet of several, pixels; measures that colour a mesh.
 _SIZE = (1280, 960)
 _SHEET = (2400, 1800)
@@ -120,11 +132,7 @@ def run(arguments: argparse.Namespace) -> int:
     tolerance = arguments.tolerance
     if tolerance is not None and not (tolerance >= 0.0 and math.isfinite(tolerance)):
         raise ViewerError(f"--tolerance: expected 0 or more, found {tolerance:g}")
-    if not 0 <= arguments.poses <= 10_000:
-        raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
-    frames = None if arguments.frames is None else parse_range(arguments.frames)
-    if frames is not None and frames.step != 1:
-        raise ViewerError(f"--frames: expected A:B without a step, found {arguments.frames}")
+    span = _checked_span(arguments)
     # Missing files are reported when they are opened.
     inputs = [Path(file) for file in arguments.common]
     for text in (arguments.reference, *arguments.files):
@@ -147,8 +155,7 @@ def run(arguments: argparse.Namespace) -> int:
     reference = open_one(arguments.reference)
     print_warnings(reference.diagnostics)
     skinning = settings_of(Skinning, arguments)
-    span = None if frames is None else (frames.first, frames.stop)
-    rows: list[_Compared] = []
+    rows: list[Comparison] = []
     heats: list[_Heat] = []
     inputs += reference.files
     for name in arguments.files:
@@ -157,7 +164,7 @@ def run(arguments: argparse.Namespace) -> int:
             inputs += other.files
             row, heat = _compared(name, reference, other, skinning, arguments.poses, span)
         except ViewerError as problem:
-            row, heat = _Compared(name, error=printable(problem, 500)), None
+            row, heat = Comparison(name, error=printable(problem, 500)), None
         rows.append(row)
         heats += [] if heat is None else [heat]
     stream = sys.stdout if output is None else summary_stream(output)
@@ -182,6 +189,67 @@ def run(arguments: argparse.Namespace) -> int:
     return _DIFFERS if exceeds else 0
 
 
+def _checked_span(arguments: argparse.Namespace) -> FrameRange | None:
+    """Return the requested frames; check them and the number of poses."""
+    if not 0 <= arguments.poses <= 10_000:
+        raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
+    frames = None if arguments.frames is None else parse_range(arguments.frames)
+    if frames is not None and frames.step != 1:
+        raise ViewerError(f"--frames: expected A:B without a step, found {arguments.frames}")
+    return None if frames is None else (frames.first, frames.stop)
+
+
+def diff(
+    reference: Scene | Actor | str | Path | Sequence[str | Path],
+    other: Scene | Actor | str | Path | Sequence[str | Path],
+    **options: object,
+) -> Comparison:
+    """Compare figures or motions with a reference, as ``viewer diff`` does.
+
+    Parameters
+    ----------
+    reference : Scene, Actor, path, or sequence of paths
+        Lengths are in its unit; several paths are opened as one scene.
+    other : Scene, Actor, path, or sequence of paths
+        What is compared with it; actors are paired by names, then by kind, then in order.
+    **options
+        Options of the command with underscores: ``poses``, ``frames`` (a range), the skinning
+        method; for files also ``up``, ``unit`` and ``animation``.
+
+    Returns
+    -------
+    Comparison
+        ``differences`` of joints, vertices, orientations and weights by actor. For motions, or
+        poses, of figures with equal joints and known units: ``mpjpe``, ``pa_mpjpe``, ``pve`` and
+        ``foot_skate`` in millimetres, and ``acceleration``; ``viewer help python`` defines them.
+
+    Raises
+    ------
+    ViewerError
+        If there is no such option or value, or a file cannot be read.
+    RigError
+        By ``mpjpe`` and the others, if joints, frames or rates differ, or units are unknown.
+
+    >>> import viewer
+    >>> fox = viewer.load("fox")
+    >>> viewer.diff(fox, fox, poses=2).exceeds(0.0)
+    False
+    """
+    without = ("output", "force", "json", "tolerance", "with")
+    arguments = arguments_of("diff", add_arguments, options, without, ["a", "b"])
+    with without_dashes():
+        span, skinning = _checked_span(arguments), settings_of(Skinning, arguments)
+        settings = settings_of(MotionSettings, arguments)
+    scenes = [
+        scene_of(what, "diff")
+        if isinstance(what, Scene | Actor)
+        else load(*paths_of("diff", what), motion=settings)
+        for what in (reference, other)
+    ]
+    name = other if isinstance(other, str | Path) else scenes[1].title or "the other"
+    return _compared(str(name), scenes[0], scenes[1], skinning, arguments.poses, span)[0]
+
+
 def _compared(
     name: str,
     reference: Scene,
@@ -189,22 +257,38 @@ def _compared(
     skinning: Skinning,
     n_poses: int,
     frames: FrameRange | None,
-) -> tuple[_Compared, _Heat | None]:
+) -> tuple[Comparison, _Heat | None]:
     pairing = pair_actors(reference.actors, other.actors)
     is_choice = len(reference.actors) > 1 or len(other.actors) > 1
     found: list[tuple[Actor, Difference]] = []
+    errors: list[PoseErrors | str] = []
     for first, second in pairing.pairs:
         # Comparing poses the reference, which must start in the same pose for each input.
         posed = first.copy()
         with shown_progress(f"comparing {Path(name).name}"):
             difference = compare(posed, second, skinning, n_poses, frames)
+            errors.append(_pose_errors(first, second, frames))
         if is_choice and first.figure.name != second.figure.name:
             paired_with = note("D002.partner: compared with {name}", name=brief(second.name))
             difference = replace(difference, notes=(paired_with, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
-    row = _Compared(name, differences, _lone(name, pairing), diagnostics=other.diagnostics)
+    lone = _lone(name, pairing)
+    row = Comparison(name, differences, lone, "", other.diagnostics, tuple(errors))
     return row, _heat_of(name, found)
+
+
+def _pose_errors(reference: Actor, found: Actor, frames: FrameRange | None) -> PoseErrors | str:
+    """Return the errors of an actor in the frames of a range, or why there are none."""
+    try:
+        if frames is None:
+            return pose_errors(found, reference)
+        sampled = sample_animation(reference)
+        low, count = sampled.first_frame, sampled.frames.n_frames
+        first, stop = (None if end is None else end - low for end in frames)
+        return pose_errors(found, reference, (first or 0, count if stop is None else stop))
+    except RigError as problem:
+        return str(problem)
 
 
 def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
@@ -332,8 +416,8 @@ def _moved_by(actor: Actor, clip: Clip | None) -> Actor:
 
 
 @dataclass(frozen=True, slots=True)
-class _Compared:
-    """Comparison of one input with the reference."""
+class Comparison:
+    """Comparison of one input with the reference; ``str`` is what ``viewer diff`` prints."""
 
     name: str
     """The argument as given."""
@@ -345,6 +429,47 @@ class _Compared:
     """Reason why the input could not be opened; empty if it was."""
     diagnostics: tuple[Diagnostic, ...] = field(default=())
     """Warnings of the file readers."""
+    pose_errors: tuple[PoseErrors | str, ...] = ()
+    """For each actor, its errors as papers state them, or why there are none."""
+
+    @property
+    def mpjpe(self) -> float:
+        """Mean per-joint position error with the roots moved together, millimetres."""
+        return self._errors().mpjpe
+
+    @property
+    def pa_mpjpe(self) -> float:
+        """Mean per-joint position error after Procrustes alignment, millimetres."""
+        return self._errors().pa_mpjpe
+
+    @property
+    def pve(self) -> float:
+        """Per-vertex error with the roots moved together, millimetres; NaN without equal meshes."""
+        return self._errors().pve
+
+    @property
+    def acceleration(self) -> float:
+        """Acceleration error of the joints, millimetres per squared second."""
+        return self._errors().acceleration
+
+    @property
+    def foot_skate(self) -> float:
+        """Mean step of feet that stand in the reference, millimetres per frame."""
+        return self._errors().foot_skate
+
+    def _errors(self) -> PoseErrors:
+        """Return the errors of the first actor; RigError if there are none."""
+        found = self.pose_errors[0] if self.pose_errors else "no actors in common"
+        if isinstance(found, str):
+            raise RigError(found)
+        return found
+
+    def to_dict(self) -> JsonObject:
+        """Return an entry of ``comparisons`` in the data of ``viewer diff --json``."""
+        return _comparison_data(self, None)
+
+    def __str__(self) -> str:
+        return "\n".join(_lines_of(self, None))
 
     def exceeds(self, tolerance: float) -> bool:
         """Return whether anything differs by more than the tolerance or was not compared."""
@@ -365,25 +490,39 @@ def _amount(value: float, kind: MeasureKind, difference: Difference) -> str:
     return f"{rounded(value, 4)} ({rounded(percent)} % of the size)"
 
 
-def _lines_of(compared: _Compared, tolerance: float | None) -> list[str]:
+def _lines_of(compared: Comparison, tolerance: float | None) -> list[str]:
     """Return the lines of one comparison."""
     lines = [f"{printable(compared.name, 300)}:"]
     if compared.error:
         return [*lines, f"  could not be compared: {compared.error}"]
     lines += [f"  {text}" for text in compared.mismatches]
     many = len(compared.differences) > 1 or bool(compared.mismatches)
-    for name, difference in compared.differences:
+    pairs = zip(compared.differences, compared.pose_errors, strict=True)
+    for (name, difference), errors in pairs:
         if many:
             lines.append(f"  {printable(name)}:")
         lines += [f"    differs: {text}" for text in difference.mismatches]
         lines += [f"    note: {text}" for text in difference.notes]
         lines += [_line(measure, difference) for measure in difference.measures]
+        lines += _error_lines(errors)
         if not difference.measures:
             lines.append("    nothing in common to compare")
     if tolerance is not None:
         verdict = "differs by more than" if compared.exceeds(tolerance) else "within"
         lines.append(f"  {verdict} the tolerance of {tolerance:g}")
     return lines
+
+
+def _error_lines(errors: PoseErrors | str) -> list[str]:
+    """Return a line of the errors that are known, for motions only; none if there are none."""
+    if isinstance(errors, str) or errors.n_frames < 2:
+        return []
+    known = [
+        f"{title} {rounded(value if value > _NOISE else 0.0, 4)} {unit}"
+        for name, (title, unit) in _ERRORS.items()
+        if math.isfinite(value := getattr(errors, name))
+    ]
+    return [f"    errors of the motion: {', '.join(known)}"]
 
 
 def _line(measure: Measure, difference: Difference) -> str:
@@ -394,14 +533,14 @@ def _line(measure: Measure, difference: Difference) -> str:
     return f"    {measure.name}: at most {most}{where}, mean {mean}"
 
 
-def _table_of(rows: Sequence[_Compared], tolerance: float | None) -> list[str]:
+def _table_of(rows: Sequence[Comparison], tolerance: float | None) -> list[str]:
     """Return one line per comparison: the largest differences over all its actors."""
     heads = ["", *_COLUMNS, "result"]
     table = [heads, *([printable(row.name, 60), *_cells(row, tolerance)] for row in rows)]
     return table_lines(table, right=range(1, len(heads) - 1))
 
 
-def _cells(row: _Compared, tolerance: float | None) -> list[str]:
+def _cells(row: Comparison, tolerance: float | None) -> list[str]:
     cells = []
     for names in _COLUMNS.values():
         found = [
@@ -423,30 +562,33 @@ def _cells(row: _Compared, tolerance: float | None) -> list[str]:
 
 
 def _json_data(
-    reference: str, rows: Sequence[_Compared], tolerance: float | None
+    reference: str, rows: Sequence[Comparison], tolerance: float | None
 ) -> dict[str, object]:
     """Return the whole report as JSON data; lengths in the reference's unit, angles in radians."""
     return {
         "reference": reference,
         "tolerance": tolerance,
-        "comparisons": [
-            {
-                "name": row.name,
-                "error": row.error or None,
-                "within": None if tolerance is None else not row.exceeds(tolerance),
-                "mismatches": [str(found) for found in row.mismatches],
-                "warnings": [str(found) for found in row.diagnostics],
-                "diagnostics": [described(found) for found in (*row.diagnostics, *row.mismatches)],
-                "actors": [_actor(name, difference) for name, difference in row.differences],
-            }
-            for row in rows
-        ],
+        "comparisons": [_comparison_data(row, tolerance) for row in rows],
     }
 
 
-def _actor(name: str, difference: Difference) -> dict[str, object]:
+def _comparison_data(row: Comparison, tolerance: float | None) -> JsonObject:
+    pairs = zip(row.differences, row.pose_errors, strict=True)
+    return {
+        "name": row.name,
+        "error": row.error or None,
+        "within": None if tolerance is None else not row.exceeds(tolerance),
+        "mismatches": [str(found) for found in row.mismatches],
+        "warnings": [str(found) for found in row.diagnostics],
+        "diagnostics": [described(found) for found in (*row.diagnostics, *row.mismatches)],
+        "actors": [_actor(name, difference, errors) for (name, difference), errors in pairs],
+    }
+
+
+def _actor(name: str, difference: Difference, errors: PoseErrors | str) -> JsonObject:
     return {
         "name": name,
+        "pose_errors": None if isinstance(errors, str) else _errors_data(errors),
         "size": difference.size,
         "unit": difference.unit or None,
         "mismatches": [str(found) for found in difference.mismatches],
@@ -468,6 +610,15 @@ def _actor(name: str, difference: Difference) -> dict[str, object]:
             }
             for measure in difference.measures
         ],
+    }
+
+
+def _errors_data(errors: PoseErrors) -> JsonObject:
+    """Return errors of a motion as JSON data, which have no NaN."""
+    values = {name: getattr(errors, name) for name in _ERRORS}
+    return {
+        **{name: value if math.isfinite(value) else None for name, value in values.items()},
+        "frames": errors.n_frames,
     }
 
 

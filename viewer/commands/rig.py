@@ -29,6 +29,7 @@ from viewer.autorig.rigged import Rigged, clip_for
 from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
+from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
@@ -61,7 +62,7 @@ from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, scene_of
 from viewer.rigs.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 
@@ -173,18 +174,8 @@ def run(arguments: argparse.Namespace) -> int:
         from viewer.exporters.vrm import checked_meta
 
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
-    if arguments.template_frame is not None:
-        if frames.frame is not None:
-            raise ViewerError("--frame and --template-frame: expected one of them, found both")
-        frames.frame, frames.option = arguments.template_frame, "--template-frame"
-    option = "--skeleton" if arguments.skeleton else "--from"
-    _check_options(arguments)
-    template_files = [
-        file
-        for name in arguments.skeleton or arguments.template or ["body"]
-        for file in _template_files(name)
-    ]
-    template = _template(template_files, option, arguments.rig or "", pose, frames, inputs)
+    _name_template_frame(arguments, frames)
+    template_files, template = _asked_template(arguments, pose, frames, inputs)
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
@@ -192,15 +183,7 @@ def run(arguments: argparse.Namespace) -> int:
     clips = _read_clips(arguments.clips, output, template_files, template.figure, frames.fps)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
-    title = f"rigging {printable(target.name, 40)}"
-    with shown_progress(title), part_of_work(title):
-        rigged = transfer(
-            template.figure,
-            template.require_pose(),
-            target.require_mesh(),
-            settings,
-            target.name,
-        )
+    rigged = _transferred(target, template, settings)
     stream = sys.stdout if output is None else summary_stream(output)
     print_warnings(line for line in rigged.lines if line.severity == "warning")
     notes = [str(line) for line in rigged.lines if line.severity == "note"]
@@ -219,11 +202,110 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def rig(
+    target: Scene | Actor | str | Path | Sequence[str | Path],
+    template: str | Path | Sequence[str | Path] | None = None,
+    *,
+    skeleton: str | Path | Sequence[str | Path] | None = None,
+    **options: object,
+) -> Scene:
+    """Rig a mesh from a template or for a skeleton, as ``viewer rig`` does.
+
+    Parameters
+    ----------
+    target : path, sequence of paths, Actor or Scene
+        The mesh, with its texture image; a rig that it has is ignored.
+    template : path, name, or sequence of them, optional
+        The rigged figure, ``"body"`` if omitted, and other files of it.
+    skeleton : path, name, or sequence of them, optional
+        Binds the mesh to the skeleton of this file instead, where it is.
+    **options
+        Options of the command with underscores: ``method``, ``max_distance``, ``max_angle``
+        (degrees), ``smooth``, ``max_influences``, ``joints``, ``fit``, ``correctives``, ``up``,
+        ``facing``, ``scale``, ``landmarks``, ``refine``, ``template_pose`` and others.
+
+    Returns
+    -------
+    Scene
+        The rigged figure, posed as the mesh was; the ``diagnostics`` say what was matched.
+
+    Raises
+    ------
+    ViewerError
+        If there is no such option or value, a file cannot be read, or there is not one mesh.
+    RigError
+        If the template has no rig, or does not match the mesh.
+    """
+    from viewer.diagnostics.record import recorded
+
+    given = {"from": template, "skeleton": skeleton}
+    words = {name: paths_of("rig", what) for name, what in given.items() if what is not None}
+    own = "output", "force", "clip", "view", "from", "skeleton"
+    without = (*own, "vrm_name", "vrm_author", "vrm_licence")
+    arguments = arguments_of("rig", add_arguments, options, without, ["a"])
+    arguments.template, arguments.skeleton = words.get("from", []), words.get("skeleton", [])
+    inputs: list[Path] = []
+    with without_dashes(), recorded() as said:
+        figure = (
+            _one_mesh(scene_of(target, "rig"))
+            if isinstance(target, Scene | Actor)
+            else _target(paths_of("rig", target), inputs)
+        )
+        pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
+        _name_template_frame(arguments, frames)
+        actor = _asked_template(arguments, pose, frames, inputs)[1]
+        settings = _settings(arguments, actor, None, figure.up)
+        rigged = _transferred(figure, actor, settings)
+    result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
+    return Scene([result], (*said.found, *rigged.lines), world_up=rigged.figure.up, files=inputs)
+
+
+def _asked_template(
+    arguments: argparse.Namespace, pose: PoseOptions, frames: Frames, inputs: list[Path]
+) -> tuple[list[Path], Actor]:
+    """Return the files of the requested template or skeleton, and its figure."""
+    option = "--skeleton" if arguments.skeleton else "--from"
+    _check_options(arguments)
+    files = [
+        file
+        for name in arguments.skeleton or arguments.template or ["body"]
+        for file in _template_files(name)
+    ]
+    return files, _template(files, option, arguments.rig or "", pose, frames, inputs)
+
+
+def _name_template_frame(arguments: argparse.Namespace, frames: Frames) -> None:
+    """Let ``--template-frame`` choose the frame, in place."""
+    if arguments.template_frame is None:
+        return
+    if frames.frame is not None:
+        raise ViewerError("--frame and --template-frame: expected one of them, found both")
+    frames.frame, frames.option = arguments.template_frame, "--template-frame"
+
+
+def _transferred(target: Figure, template: Actor, settings: TransferSettings) -> Rigged:
+    """Return the target with the template's rig; a progress bar is shown."""
+    title = f"rigging {printable(target.name, 40)}"
+    with shown_progress(title), part_of_work(title):
+        return transfer(
+            template.figure,
+            template.require_pose(),
+            target.require_mesh(),
+            settings,
+            target.name,
+        )
+
+
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
-    """Return the mesh to rig; a mesh that has a rig is used in its current pose."""
+    """Return the mesh to rig."""
     scene = load(*map(resolve, files))
     inputs += scene.files
     print_warnings(scene.diagnostics)
+    return _one_mesh(scene)
+
+
+def _one_mesh(scene: Scene) -> Figure:
+    """Return the mesh of a scene; a mesh that has a rig is used in its current pose."""
     meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
     if len(meshes) != 1:
         raise ViewerError(f"expected one mesh to rig, found {len(meshes)}")

@@ -26,6 +26,9 @@ class Record:
     diagnostics: list[JsonObject] = field(default_factory=list)
     """Warnings and notes as returned by ``described``; entries that are only text have just
     ``severity`` and ``message``."""
+    found: list[Diagnostic] = field(default_factory=list)
+    """The same warnings and notes as they were found; entries that are only text have the code
+    F007."""
     values: dict[str, object] = field(default_factory=dict)
     """Results as JSON data."""
     outputs: dict[str, None] = field(default_factory=dict)
@@ -58,9 +61,13 @@ def note_found(found: Diagnostic | str, severity: Severity = "warning") -> bool:
     if _current is None:
         return False
     if isinstance(found, Diagnostic):
+        _current.found.append(found)
         _current.diagnostics.append(described(found))
     else:
         text = printable(found, 2000)
+        _current.found.append(
+            Diagnostic("F007.said: {message}", values={"message": text}, level=severity)
+        )
         _current.diagnostics.append({"severity": severity, "message": text})
     return True
 

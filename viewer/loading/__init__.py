@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from viewer.errors import ViewerError
 from viewer.formats import MAX_SIZE
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.contents import Contents, read_files, read_source
 from viewer.loading.settings import MotionSettings
 from viewer.models import bundled_body, bundled_files, named_files
+from viewer.phrases import printable
+from viewer.rigs.bodies.smpl_family import GENDERS
 from viewer.rigs.scene import Scene
 
 __all__ = [
@@ -76,6 +79,14 @@ def load(
     >>> scene.actors[0].figure.name
     'fox'
     """
+    for path in paths:
+        if not isinstance(path, str | Path):
+            raise ViewerError(
+                f"load: expected paths or names, found {type(path).__name__}; several are given "
+                "as load(*paths)"
+            )
+    if gender and gender not in GENDERS:
+        raise ViewerError(f'gender: expected {" or ".join(GENDERS)}, found "{printable(gender)}"')
     settings = motion or MotionSettings()
     if model is not None or gender:
         settings = replace(settings, model=model or settings.model, gender=gender)

@@ -292,7 +292,7 @@ def _skin(
             )
         entries = weights.tocoo()
         vertices, joints, amounts = entries.row, entries.col, entries.data
-    elif isinstance(weights, tuple):
+    elif isinstance(weights, tuple) and len(weights) == 2:
         indices, values = np.asarray(weights[0]), np.asarray(weights[1], dtype=np.float64)
         if indices.shape != values.shape or indices.ndim != 2 or len(indices) != n_vertices:
             raise RigError(

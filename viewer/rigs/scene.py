@@ -418,6 +418,17 @@ class Scene:
         return self.actors[0].figure.up if self.actors else "y"
 
 
+def scene_of(what: Scene | Actor, name: str) -> Scene:
+    """Return a scene of what a function was given; ``name``: of the function, for errors."""
+    if isinstance(what, Scene):
+        return what
+    if not isinstance(what, Actor):
+        raise RigError(f"{name}: expected a scene or an actor, found {type(what).__name__}")
+    files = [origin.path for origin in what.figure.origins]
+    files += [] if what.clip_origin is None else [what.clip_origin[0]]
+    return Scene([what], files=files)
+
+
 def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
     """Return the seconds from the earliest start to the latest end of all clips."""
     spans = [

@@ -8,8 +8,7 @@ from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model
 
 from viewer.cli import run
-from viewer.commands._cleanup import clean_up_of
-from viewer.commands._scene import add_gap_arguments
+from viewer.commands._cleanup import add_gap_arguments, clean_up_of
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
 from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay

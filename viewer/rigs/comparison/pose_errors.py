@@ -1,9 +1,10 @@
-"""Errors of an estimated motion: MPJPE, PA-MPJPE, PVE and acceleration error, as papers state them.
+"""Errors of an estimated motion: MPJPE, PA-MPJPE, PVE, acceleration error and foot skate.
 
 Ionescu, Papava, Olaru, Sminchisescu 2014, "Human3.6M": MPJPE, after moving the roots together.
 Zhou, Zhu, Leonardos, Derpanis, Daniilidis 2017, "Sparseness Meets Deepness": PA-MPJPE, after the
 similarity that fits best. Kanazawa, Zhang, Felsen, Malik 2019, "Learning 3D Human Dynamics from
-Video": acceleration error. Pavlakos, Zhu, Zhou, Daniilidis 2018: per-vertex error.
+Video": acceleration error. Pavlakos, Zhu, Zhou, Daniilidis 2018: per-vertex error. Shin, Kim,
+Halilaj, Black 2024, "WHAM": foot skate, in frames in which the feet of the reference stand.
 """
 
 from __future__ import annotations
@@ -15,7 +16,14 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.feet.body import body_legs
+from viewer.rigs.feet.contacts import foot_contacts
+from viewer.rigs.feet.legs import legs_of
+from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.scene import Actor
 from viewer.rigs.units import METRES
 
@@ -35,11 +43,16 @@ class PoseErrors:
     acceleration: float
     """Mean difference of the joints' accelerations, in millimetres per squared second; NaN for
     fewer than three frames in a row."""
+    foot_skate: float
+    """Mean distance that a foot moves from one frame to the next while it stands in the reference;
+    NaN if no foot of it is known to stand."""
     n_frames: int
     """Number of frames in which both are present."""
 
 
-def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
+def pose_errors(
+    found: Actor, reference: Actor, frames: tuple[int, int] | None = None
+) -> PoseErrors:
     """Return the errors of a motion against a reference, as papers on body capture state them.
 
     Parameters
@@ -48,6 +61,8 @@ def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
         The estimated motion, or a pose.
     reference : Actor
         The true one: as many joints and frames, at the same rate. Joints correspond by index.
+    frames : (int, int), optional
+        First frame and the frame after the last one, counted from 0; all by default.
 
     Returns
     -------
@@ -70,7 +85,9 @@ def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
     if rates[0] != rates[1]:
         raise RigError(f"{found.name}: expected {rates[1]:g} frames per second, found {rates[0]:g}")
     scales = [_millimetres(actor) for actor in (found, reference)]
-    ours, theirs = ours * scales[0], theirs * scales[1]
+    chosen = slice(*(frames or (0, len(ours))))
+    skate = _foot_skate(ours * scales[0], reference, rates[0], chosen)
+    ours, theirs = ours[chosen] * scales[0], theirs[chosen] * scales[1]
     seen: Bools = np.isfinite(np.concatenate([ours, theirs], axis=1)).all(axis=(1, 2))
     if not seen.any():
         raise RigError(f"{found.name} and {reference.name}: no frame has both")
@@ -78,17 +95,47 @@ def pose_errors(found: Actor, reference: Actor) -> PoseErrors:
     apart = ours - roots[0] - (theirs - roots[1])
     fitted = np.stack([_fitted(a, b) for a, b in zip(ours[seen], theirs[seen], strict=True)])
     pve = math.nan
-    if found.figure.mesh is not None and reference.figure.mesh is not None:
-        body, other = found.vertices() * scales[0], reference.vertices() * scales[1]
-        if body.shape == other.shape:
-            pve = _mean((body - roots[0] - (other - roots[1]))[seen])
+    meshes = [actor.figure.mesh for actor in (found, reference)]
+    if None not in meshes and len({mesh.n_vertices for mesh in meshes if mesh is not None}) == 1:
+        body = found.vertices()[chosen] * scales[0]
+        other = reference.vertices()[chosen] * scales[1]
+        pve = _mean((body - roots[0] - (other - roots[1]))[seen])
     return PoseErrors(
         mpjpe=_mean(apart[seen]),
         pa_mpjpe=_mean(fitted - theirs[seen]),
         pve=pve,
         acceleration=_acceleration(ours, theirs, seen, rates[0]),
+        foot_skate=skate,
         n_frames=int(seen.sum()),
     )
+
+
+def _foot_skate(ours: Floats, reference: Actor, rate: float, chosen: slice) -> float:
+    """Return the mean step of joints (F, J, 3) of feet that stand in the reference, all frames."""
+    figure, legs = reference.figure, legs_of(reference.figure.require_skeleton())
+    if reference.joint_motion is None or not legs:
+        return math.nan
+    frames = sample_animation(reference).frames
+    rows = np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)
+    clip = SampledClip(reference.name, Timing(rate, rows), *frames.arrays)
+    up = axis_vector(figure.up)
+    body = body_legs(figure, clip, legs, up)
+    if body is None or body.size <= 0.0:
+        return math.nan
+    # A frame of the clip is a row of ``ours``. Spans are ranges of present rows.
+    spans = runs_of(frames.present)
+    contacts = foot_contacts(body.paths(body.worlds(clip)), spans, rate, body.size, up)
+    first, stop, _ = chosen.indices(len(ours))
+    steps = [np.zeros(0)]
+    for leg, stands in zip(legs, contacts, strict=True):
+        for contact in stands:
+            held = np.arange(max(contact.start, first), min(contact.stop, stop) - 1)
+            # The ball holds while it is on the ground, else the heel, as an ankle does not roll.
+            joint = np.where(contact.on_toe[held - contact.start], leg.toe, leg.ankle)
+            steps.append(np.linalg.norm(ours[held + 1, joint] - ours[held, joint], axis=1))
+    moved = np.concatenate(steps)
+    moved = moved[np.isfinite(moved)]
+    return float(moved.mean()) if len(moved) else math.nan
 
 
 def _mean(apart: Floats) -> float:

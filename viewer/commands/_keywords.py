@@ -1,0 +1,150 @@
+"""Keyword arguments of Python functions as options of the command that does the same.
+
+The parser of the command is the only definition of the options: ``max_speed=3`` is read like
+``--max-speed 3``, with the same limits, choices and defaults.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from viewer.commands._usage import Parser
+from viewer.errors import FormatError, ViewerError
+from viewer.near_names import did_you_mean
+from viewer.phrases import all_of, printable
+
+_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
+
+
+class _KeywordParser(Parser):
+    """Parser whose errors name keyword arguments."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ViewerError without advice about the command line."""
+        raise ViewerError(message.removeprefix("argument "))
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> object:
+        """Return the value of an option; argparse would name the function that reads it."""
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as problem:
+            if not str(problem.message).startswith("invalid "):
+                raise
+            wanted = str(action.metavar) if "|" in str(action.metavar) else "a number"
+            raise argparse.ArgumentError(
+                action, f'expected {wanted}, found "{printable(arg_string, 60)}"'
+            ) from None
+
+
+def paths_of(function: str, what: object) -> list[str]:
+    """Return paths or names of models: one, or a sequence of them."""
+    found = [*what] if isinstance(what, list | tuple) else [what]
+    for each in found:
+        if not isinstance(each, str | Path):
+            raise ViewerError(
+                f"{function}: expected a scene, an actor or paths, found {type(each).__name__}"
+            )
+    return [*map(str, found)]
+
+
+def arguments_of(
+    function: str,
+    add_arguments: Callable[[argparse.ArgumentParser], None],
+    options: Mapping[str, object],
+    without: Sequence[str] = (),
+    positional: Sequence[str] = (),
+) -> argparse.Namespace:
+    """Return the arguments of a command for keyword arguments of a function.
+
+    ``without``: options that the function has no use for; ``positional``: words for what the
+    command takes without an option. ViewerError for an unknown name, which lists those allowed, or
+    a wrong value.
+    """
+    parser = _KeywordParser(prog=function, add_help=False)
+    add_arguments(parser)
+    known = _known(parser, without)
+    words = [*positional]
+    for name, value in options.items():
+        if name not in known:
+            near = did_you_mean(name, known)
+            listed = f"allowed: {all_of(sorted(known))}"
+            raise ViewerError(
+                f"{function}: no option is called {printable(name, 60)}; "
+                f"{f'{near} ' if near else ''}{listed}"
+            )
+        if value is not None:
+            words += _words(name, *known[name], value)
+    with without_dashes():
+        return parser.parse_intermixed_args(words)
+
+
+def _known(
+    parser: argparse.ArgumentParser, without: Sequence[str]
+) -> dict[str, tuple[argparse.Action, str]]:
+    """Return actions and option strings by keyword; ``--no-fit`` is ``fit``."""
+    found = {}
+    for action in parser._actions:  # argparse has no public name for this table
+        if action.help == argparse.SUPPRESS:
+            continue
+        for flag in action.option_strings:
+            name = flag.removeprefix("--").replace("-", "_")
+            if flag.startswith("--") and name not in without:
+                found[name.removeprefix("no_")] = action, flag
+    return found
+
+
+def _words(name: str, action: argparse.Action, flag: str, value: object) -> list[str]:
+    """Return the words of the command line for a value."""
+    if action.nargs == 0:
+        if not isinstance(value, bool | np.bool_):
+            raise ViewerError(f"{name}: expected True or False, found {printable(value, 60)}")
+        return [flag] if bool(value) != flag.startswith("--no-") else []
+    if isinstance(value, bool | np.bool_):
+        if {*(action.choices or ())} == {"on", "off"}:
+            return [f"{flag}={'on' if value else 'off'}"]
+        if value and action.nargs == "?":
+            return [flag]
+        if value or action.nargs != "?":
+            raise ViewerError(f"{name}: expected a value, found {value}")
+        return []
+    # An option that may be repeated takes a list; numbers are one value, as in A,B.
+    values: Sequence[object] = [value]
+    if type(action).__name__ == "_AppendAction" and isinstance(value, list | tuple):
+        values = [value] if all(isinstance(each, int | float) for each in value) else value
+    return [f"{flag}={_text(name, each)}" for each in values]
+
+
+def _text(name: str, value: object) -> str:
+    """Return a value as on the command line."""
+    if isinstance(value, str | Path):
+        return str(value)
+    if isinstance(value, int | float | np.integer | np.floating):
+        return repr(value.item() if isinstance(value, np.generic) else value)
+    if isinstance(value, range):
+        step = f":{value.step}" if value.step != 1 else ""
+        return f"{value.start}:{value.stop}{step}"
+    if isinstance(value, list | tuple | np.ndarray):
+        return ",".join(_text(name, each) for each in value)
+    raise ViewerError(
+        f"{name}: expected a number, a text or a list of numbers, found {type(value).__name__}"
+    )
+
+
+@contextmanager
+def without_dashes() -> Iterator[None]:
+    """Name settings in errors as in Python: messages of the command name its options."""
+    try:
+        yield
+    except ViewerError as problem:
+        text = str(problem).removeprefix("--scalar ")
+        named = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
+        if named == str(problem) or isinstance(problem, FormatError):
+            raise
+        raise type(problem)(named) from None
