@@ -144,6 +144,12 @@ def test_items_at_fault_are_found_within_tasks(tmp_path):
     assert len(Path(some[200].output).read_text().split()) == 3
 
 
+def test_workers_that_dask_gives_up_are_replaced(monkeypatch):
+    monkeypatch.setitem(dask_cluster._CONFIG, "distributed.deploy.lost-worker-timeout", "1ms")
+    found = finished(Job(), items(20, crash=5), Limits(1, retries=0, cluster="local"))
+    assert {n for n, one in found.items() if one.status != "done"} == {5}
+
+
 def test_two_thousand_files_of_which_some_are_broken(address, tmp_path):
     broken = write_numbers(tmp_path / "in", 2000)
     report = viewer.batch(

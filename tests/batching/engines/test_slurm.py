@@ -101,6 +101,26 @@ def test_jobs_that_end_are_submitted_again(jobs, tmp_path):
     assert "export DASK_DISTRIBUTED__WORKER__MEMORY__PAUSE=False" in script
 
 
+def test_results_of_a_job_that_ends_before_they_are_fetched(jobs, monkeypatch):
+    from distributed import Client
+
+    def gather(self, futures, **options):
+        if not ended and futures:
+            os.killpg(process_of(jobs / "job1"), signal.SIGKILL)
+            while self.scheduler_info()["workers"]:
+                time.sleep(0.05)
+            ended.append(futures)
+        return fetch(self, futures, **options)
+
+    fetch, ended = Client.gather, []
+    monkeypatch.setattr(Client, "gather", gather)
+    monkeypatch.setattr(dask_cluster, "_FETCH", 0.5)
+    results = list(dask_cluster.run(items(10), Job(), Limits(1, cluster="slurm:interface=lo")))
+    assert ended
+    assert Counter(one.item.index for one in results) == Counter(range(10))
+    assert {one.status for one in results} == {"done"}
+
+
 def test_refused_jobs_are_reported(jobs):
     (jobs / "most").write_text("0")
     with pytest.raises(ViewerError) as caught:

@@ -7,6 +7,7 @@ reported.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import itertools
 import logging
@@ -18,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import astuple, field, replace
+from functools import partial
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -45,6 +47,7 @@ _COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leav
 _ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 _CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
+_FETCH = 10.0  # seconds after which results are asked for again; they are a few kB each
 _ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 # The batch itself counts retries and tracks which items a worker had started.
@@ -63,6 +66,9 @@ _CONFIG = {
     "distributed.admin.system-monitor.interval": "10s",
     "distributed.admin.tick.interval": "1s",
     "distributed.scheduler.active-memory-manager.start": False,
+    # On a busy machine, a worker needs longer to restart than the default of 15 s, after which Dask
+    # gives it up.
+    "distributed.deploy.lost-worker-timeout": "60s",
 }
 
 
@@ -232,7 +238,13 @@ class _Flight:
         """Return the results of tasks that ended; items without a result are run again."""
         finished = [future for future in done if future.status == "finished"]
         try:
-            replies = self.client.gather(finished)
+            replies = self._fetched(finished)
+        except TimeoutError:
+            # Their worker has died. The tasks may have to wait for another one, which only
+            # ``count_workers`` starts.
+            for future in done:
+                future.add_done_callback(self._done.put)
+            return []
         except (OSError, CancelledError):
             raise _lost() from None
         except Exception:
@@ -251,6 +263,16 @@ class _Flight:
             if future in self.flying:
                 results += self._failure(future, self.flying.pop(future))
         return results
+
+    def _fetched(self, finished: list[Future]) -> list[Reply | OtherVersion | NoFolder]:
+        """Return the replies of finished tasks; raise TimeoutError if they do not arrive."""
+        fetching = asyncio.run_coroutine_threadsafe(
+            self.client.gather(finished, asynchronous=True), self.client.loop.asyncio_loop
+        )
+        try:
+            return fetching.result(_FETCH)
+        finally:
+            fetching.cancel()
 
     def _failure(self, future: Future, task: _Task) -> list[tuple[_Attempt, Result]]:
         """Return the result of the item due to which no worker has finished a task, if known."""
@@ -347,12 +369,14 @@ def _connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Chec
             # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
             # batch decides which items are finished.
             folder = stack.enter_context(TemporaryDirectory(prefix="viewer-dask-"))
-            with signals_blocked(), dask.config.set(_CONFIG):
+            stack.enter_context(dask.config.set(_CONFIG))  # also read when workers are replaced
+            with signals_blocked():
                 if name.kind == "local":
                     target = _local_cluster(limits, folder)
                 else:
                     target = slurm_cluster(name, limits.memory, _CONFIG)
             stack.enter_context(target)
+            check = partial(_replace_workers, target, limits.workers)
             if name.kind == "slurm":
                 check = SlurmJobs(target, limits.workers, limits.note).check
         try:
@@ -367,7 +391,13 @@ def _connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Chec
 
 
 def _nothing_to_replace(workers: Iterable[str]) -> None:
-    """Do nothing: Dask restarts the workers of this machine, and others belong to the user."""
+    """Do nothing: these workers belong to the user."""
+
+
+def _replace_workers(cluster: Any, n_workers: int, connected: Iterable[str]) -> None:
+    """Start new workers for those that Dask has given up, since they did not restart in time."""
+    if len(cluster.workers) < n_workers:
+        cluster.scale(n_workers)
 
 
 def _local_cluster(limits: Limits, folder: str) -> Any:
