@@ -43,9 +43,10 @@ def check(subject: Subject) -> Iterator[Finding]:
         "C022.bones: {n} length: {names} (most: {joint}, to {ratio} times that at rest at frame "
         "{frame})",
     )
-    if len(track.scales) == len(track.times) > 1:
+    factors = track.scales / np.where(skeleton.rest_scales > 0.0, skeleton.rest_scales, 1.0)
+    if len(track.times) > 1 and (factors != 1.0).any():
         joints = np.arange(skeleton.n_joints)
-        factors = track.scales / np.where(skeleton.rest_scales > 0.0, skeleton.rest_scales, 1.0)
+        factors = np.broadcast_to(factors, (len(track.times), *factors.shape[1:]))
         # The axis that changes most stands for the joint.
         axes = np.abs(np.log(np.maximum(factors, 1e-12))).argmax(axis=2)
         scales = np.take_along_axis(factors, axes[..., None], axis=2)[..., 0]
