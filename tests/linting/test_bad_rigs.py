@@ -17,6 +17,7 @@ from viewer.linting import (
     blending,
     hands,
     joint_places,
+    noise,
     spikes,
     stray_weights,
     symmetry,
@@ -32,7 +33,7 @@ from viewer.rigs.scene import Actor
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skin import normalized, owners, skin_from_entries, skin_from_lists, skin_rows
 
-CHECKS = (stray_weights, blending, bindings, joint_places, spikes, symmetry)
+CHECKS = (stray_weights, blending, noise, bindings, joint_places, spikes, symmetry)
 
 
 @cache
@@ -100,6 +101,16 @@ def linted(figure: Figure, checks: tuple[ModuleType, ...] = CHECKS) -> list[Find
 
 # The head's vertex with the largest weight of the head.
 NOSE = 121
+# A vertex in the middle of the left thigh, which no other joint moves.
+THIGH = int(
+    np.argmin(
+        np.linalg.norm(
+            body().mesh.positions
+            - rest_joints(body())[[joint("left_hip"), joint("left_knee")]].mean(axis=0),
+            axis=1,
+        )
+    )
+)
 
 
 def stray(fraction: float) -> Callable[[], Figure]:
@@ -142,10 +153,32 @@ def hard_elbow() -> Figure:
     return weighted(weights)
 
 
-def noisy() -> Figure:
-    weights = table()
-    noise = np.random.default_rng(0).uniform(-0.2, 0.2, weights.shape) * (weights > 0.02)
-    return weighted(np.clip(weights + noise, 0.0, 1.0))
+def noisy(size: float, root: str = "pelvis") -> Callable[[], Figure]:
+    """Return the body with noise in all weights that blend, or in those of one limb."""
+
+    def make() -> Figure:
+        weights = table()
+        noise = np.random.default_rng(0).uniform(-size, size, weights.shape) * (weights > 0.02)
+        on = weights[:, below(root)].sum(axis=1) > 0.3
+        return weighted(np.clip(weights + noise * on[:, None], 0.0, 1.0))
+
+    return make
+
+
+def crossed() -> Figure:
+    """Return the body with a vertex of a thigh that moves by 30 % with the other thigh."""
+    weights = table().copy()
+    weights[THIGH] *= 0.7
+    weights[THIGH, joint("right_hip")] += 0.3
+    return weighted(weights)
+
+
+def turned_in_another_pose() -> Figure:
+    """Return the body with a rotated knee, whose joints at rest are rotated about random axes."""
+    figure, rng = turned(), np.random.default_rng(1)
+    rotations = rng.normal(size=(figure.skeleton.n_joints, 4))
+    rotations /= np.linalg.norm(rotations, axis=1)[:, None]
+    return replace(figure, skeleton=replace(figure.skeleton, rest_rotations=rotations))
 
 
 def lopsided() -> Figure:
@@ -214,7 +247,8 @@ def stuck_out() -> Figure:
 
 CHECKED = {
     ("W011", "W012", "W013"): stray_weights,
-    ("W014", "W015", "W016"): blending,
+    ("W014", "W015"): blending,
+    ("W016",): noise,
     ("B",): bindings,
     ("S",): joint_places,
     ("M",): spikes,
@@ -230,13 +264,19 @@ FAULTS = {
     ),
     "hard everywhere": (hard, "W015.everywhere", [], None),
     "hard elbow": (hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None),
-    "noise": (noisy, "W016.noise", None, None),
+    "noise": (noisy(0.2), "W016.noise", None, None),
+    "mild noise": (noisy(0.1), "W016.alternating", None, None),
+    "noise of one side": (noisy(0.05, "left_shoulder"), "W016.sides", None, None),
+    "crossed": (crossed, "W011.strays", ["right_hip"], [THIGH]),
     "one arm differs": (lopsided, "Y002.joints", None, None),
     "one elbow moved": (
         lambda: moved(("left_elbow", [0.0, 0.1, 0.0])), "Y003.joints",
         ["left_elbow", "right_elbow"], [],
     ),
     "bound with 30 degrees": (turned, "B007.rotations", ["left_knee"], []),
+    "bound with 30 degrees in another pose": (
+        turned_in_another_pose, "B007.rotations", ["left_knee"], []
+    ),
     "elbow at the shoulder": (flattened, "S011.joints", ["left_elbow"], []),
     "knees before the legs": (
         lambda: moved(("left_knee", [0.0, 0.0, 0.2]), ("right_knee", [0.0, 0.0, 0.2])),

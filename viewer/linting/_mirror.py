@@ -15,7 +15,6 @@ from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.retargeting.joint_names import sided_words
 from viewer.rigs.retargeting.mirror import word_partners
 from viewer.rigs.skeleton import Skeleton
-from viewer.rigs.skin import bind_positions
 
 _EXACT = 1e-4  # maximum distance of a vertex from the image of its counterpart, of the size
 _SYMMETRIC = 0.5  # minimum fraction of vertices with a counterpart in a symmetric mesh
@@ -36,8 +35,6 @@ class Mirror:
     """(V,): vertices that have one and are the first at their position."""
     joints: Ints
     """(J,): counterpart of each joint by name; -1 if it has a side, but no counterpart."""
-    errors: Floats
-    """(J,): distances of the joints' bind positions from the images of their counterparts."""
 
 
 def mirror_of(figure: Figure) -> Mirror | None:
@@ -75,10 +72,7 @@ def _mirror(figure: Figure) -> Mirror | None:
     vertices[firsts[paired]] = firsts[found[paired]]
     known[firsts[paired]] = True
     joints = name_partners(figure.require_skeleton())
-    places = bind_positions(figure.require_skin())
-    errors = np.linalg.norm(reflected(places, axis, centre) - places[joints], axis=1)
-    errors[joints < 0] = 0.0
-    return Mirror(axis, centre, vertices, known, joints, errors)
+    return Mirror(axis, centre, vertices, known, joints)
 
 
 def _counterparts(points: Floats, axis: int, centre: float, tolerance: float) -> Indices:

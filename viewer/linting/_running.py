@@ -37,6 +37,7 @@ CHECKS = {
     "weights": Check("weights"),
     "stray_weights": Check("stray weights"),
     "blending": Check("blending of weights"),
+    "noise": Check("noise of weights"),
     "bindings": Check("bind matrices"),
     "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
     "joint_places": Check("places of joints"),

@@ -7,21 +7,23 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Subject
+from viewer.linting._subject import Indices, Subject
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Bools
+from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.inspection.faults import are_usable, bind_faults
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skeleton import Skeleton, joint_labels
-from viewer.rigs.skin import moves_vertices
+from viewer.rigs.skin import Skin, bind_positions, moves_vertices
 
 # Fraction of the figure's size: smaller differences are rounding errors of old files.
 _ELSEWHERE = 0.01
 _ASTRAY = np.radians(5.0)  # smallest rotation of a joint that is seen
+_SHORT = 1e-3  # relative length below which a bone has no direction
 _SEVERAL = 8  # minimum number of joints that show what is usual
 _FEW = 0.25  # maximum fraction of joints that are exceptions
 
@@ -75,7 +77,7 @@ def _placed(subject: Subject, skeleton: Skeleton) -> Bools:
 
 
 def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
-    """Report single joints that rotate the mesh at rest, while most do not."""
+    """Report single joints that are bound with another rotation than most."""
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or skeleton is None or figure.mesh is None:
         return
@@ -83,17 +85,14 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
     used = np.flatnonzero(moves_vertices(skin) & known)
     if len(used) < _SEVERAL:
         return
-    worlds = world_matrices(skeleton, rest_pose(skeleton))[used]
-    turns, _ = nearest_rotations((worlds @ skin.inverse_bind[used])[:, :3, :3])
-    # Angles between the rotations of all pairs, from trace(A^T B) = 1 + 2 cos; the pose of most
-    # joints is that of the mesh.
-    traces = np.einsum("iab,jab->ij", turns, turns)
-    angles = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
-    usual = int((angles < _ASTRAY).sum(axis=1).argmax())
-    off = np.flatnonzero(angles[usual] > _ASTRAY)
-    if len(off) == 0 or len(off) > _FEW * len(used):
-        return  # the mesh is bound in another pose: a note says so
-    off = off[np.argsort(-angles[usual][off], kind="stable")]
+    angles = _angles_at_rest(skin, skeleton, used)
+    # If the mesh is bound in another pose, bones still leave their joints in the same direction.
+    if (angles > _ASTRAY).sum() > _FEW * len(used):
+        angles = _angles_to_children(skin, skeleton, used)
+    off = np.flatnonzero(angles > _ASTRAY)
+    if len(off) == 0 or len(off) > _FEW * np.isfinite(angles).sum():
+        return  # a note says that bind and rest pose differ
+    off = off[np.argsort(-angles[off], kind="stable")]
     joints, labels = used[off], joint_labels(skeleton)
     yield subject.found(
         "B007.rotations: {n} bound with a rotation that differs from the rest pose: {names} "
@@ -101,7 +100,39 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
         n=counted(len(joints), "joint", "is", "are"),
         names=listed([labels[joint] for joint in joints]),
         joint=labels[joints[0]],
-        angle=float(np.degrees(angles[usual][off[0]])),
+        angle=float(np.degrees(angles[off[0]])),
         joints=joints,
         at=("bindings", int(joints[0])),
     )
+
+
+def _angles_at_rest(skin: Skin, skeleton: Skeleton, used: Indices) -> Floats:
+    """Return by how much joints (N,) rotate the mesh at rest, compared with most of them: (N,)."""
+    worlds = world_matrices(skeleton, rest_pose(skeleton))[used]
+    turns, _ = nearest_rotations((worlds @ skin.inverse_bind[used])[:, :3, :3])
+    # Angles between the rotations of all pairs, from trace(A^T B) = 1 + 2 cos; the pose of most
+    # joints is that of the mesh.
+    traces = np.einsum("iab,jab->ij", turns, turns)
+    angles: Floats = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    return angles[int((angles < _ASTRAY).sum(axis=1).argmax())]
+
+
+def _angles_to_children(skin: Skin, skeleton: Skeleton, used: Indices) -> Floats:
+    """Return the angle of joints (N,) between their bones at rest and as bound; NaN without bones.
+
+    The position of a child, in the space of its parent, does not depend on the pose. Of several
+    children, that with the smallest angle counts: one may have been moved.
+    """
+    smallest = np.full(skeleton.n_joints, np.inf)
+    below = used[skeleton.parents[used] >= 0]
+    above = skeleton.parents[below]
+    places = bind_positions(skin)[below]
+    matrices = skin.inverse_bind[above]
+    bound = np.einsum("nab,nb->na", matrices[:, :3, :3], places) + matrices[:, :3, 3]
+    rest = skeleton.rest_translations[below]
+    cosines = np.einsum("na,na->n", unit(bound), unit(rest))
+    apart = np.linalg.norm(rest, axis=1) > _SHORT * np.abs(skeleton.rest_translations).max()
+    angles = np.where(apart, np.arccos(np.clip(cosines, -1.0, 1.0)), np.inf)
+    np.minimum.at(smallest, above, angles)
+    result = smallest[used]
+    return np.where(np.isfinite(result), result, np.nan)

@@ -1,4 +1,4 @@
-"""Checks of how weights blend along the surface: torn seams, hard borders and noise."""
+"""Checks of how weights blend along the surface: torn seams and hard borders."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Subject
-from viewer.linting._surface import FEWEST, LEAST, Support, Surface, support_of, surface_of
+from viewer.linting._mirror import name_partners
+from viewer.linting._subject import Indices, Subject
+from viewer.linting._surface import FEWEST, Support, Surface, support_of, surface_of
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools
+from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import edges_of
 from viewer.rigs.mesh import Mesh
@@ -27,13 +28,8 @@ _HARD = 0.95  # minimum fraction of hard edges between two joints
 # the joints of fingers or a tail, so are others.
 _ALL_HARD = 0.6  # fraction of all border edges above which the whole figure is hard
 _OTHERS = 0.01  # fraction of the other border edges up to which a hard border is an exception
+_SOFT = 0.3  # fraction of hard edges below which the border of the other side blends
 _FEW_BORDERS = 2  # more hard borders are made so, as those of all toes of a spider
-# A smooth weight has no peaks except at its largest values: it is between those of its neighbours.
-# In the same rigs, at most 2.5 % of the weights that blend, and 13 % of those of one joint, are
-# outside by this much.
-_PEAK = 0.05
-_NOISY, _NOISY_JOINT = 0.04, 0.15  # fractions above which weights are noisy
-_FEWEST = 30  # minimum number of vertices that blend with such a joint
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -48,7 +44,6 @@ def check(subject: Subject) -> Iterator[Finding]:
     found = support_of(figure)
     if figure.mesh.n_vertices >= FEWEST and len(found.vertices):
         yield from _hard(subject, figure, found, surface)
-        yield from _noise(subject, figure, found, surface)
 
 
 def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterator[Finding]:
@@ -137,9 +132,13 @@ def _hard(subject: Subject, figure: Figure, found: Support, surface: Surface) ->
     is_limb = (parents[distinct[:, 0]] == distinct[:, 1]) | (
         parents[distinct[:, 1]] == distinct[:, 0]
     )
-    borders = np.flatnonzero(is_limb & (n_edges >= _RING) & (n_hard > _HARD * n_edges))
+    are_hard = is_limb & (n_edges >= _RING) & (n_hard > _HARD * n_edges)
+    borders = np.flatnonzero(are_hard)
     others = is_hard.sum() - n_hard[borders].sum()
-    if len(borders) == 0 or others > _OTHERS * len(edges) or len(borders) > _FEW_BORDERS:
+    if others > _OTHERS * len(edges) or len(borders) > _FEW_BORDERS:
+        # Where hard borders are usual, those of one side are not meant if the other side blends.
+        borders = np.flatnonzero(are_hard & _blends_opposite(figure, distinct, n_hard / n_edges))
+    if len(borders) == 0:
         return
     names = [Phrase("{a} and {b}", a=labels[a], b=labels[b]) for a, b in distinct[borders]]
     on = np.isin(pair, borders) & is_hard
@@ -152,39 +151,15 @@ def _hard(subject: Subject, figure: Figure, found: Support, surface: Surface) ->
     )
 
 
-def _noise(subject: Subject, figure: Figure, found: Support, surface: Surface) -> Iterator[Finding]:
-    """Report weights outside the range of those of their neighbours."""
-    count, size = len(surface.place), len(found.places)
-    n_around = np.bincount(surface.edges[:, 0], minlength=count)[found.places]
-    n_shared = np.bincount(found.links[:, 0], minlength=size)
-    highest, lowest = np.zeros(size), np.ones(size)
-    np.maximum.at(highest, found.links[:, 0], found.place_weights[found.links[:, 1]])
-    np.minimum.at(lowest, found.links[:, 0], found.place_weights[found.links[:, 1]])
-    lowest[n_shared < n_around] = 0.0
-    outside = np.maximum(found.place_weights - highest, lowest - found.place_weights)
-    outside[n_around == 0] = 0.0
-    blends = (found.place_weights > LEAST) & (found.place_weights < _RIGID)
-    peaks = (outside > _PEAK) & blends
-    n_joints = figure.require_skeleton().n_joints
-    n_blending = np.bincount(found.place_joints[blends], minlength=n_joints)
-    n_peaks = np.bincount(found.place_joints[peaks], minlength=n_joints)
-    joints = np.flatnonzero((n_blending >= _FEWEST) & (n_peaks > _NOISY_JOINT * n_blending))
-    n_blends = int(blends.sum())
-    if len(joints) == 0 and (int(peaks.sum()) <= _NOISY * n_blends or n_blends < _FEWEST):
-        return
-    rows = np.flatnonzero(peaks & np.isin(found.place_joints, joints) if len(joints) else peaks)
-    rows = rows[np.argsort(-outside[rows], kind="stable")]
-    first, labels = int(rows[0]), joint_labels(figure.require_skeleton())
-    yield subject.found(
-        "W016.noise: {n} above or below those of all neighbours (worst: {weight} of {joint} at "
-        "vertex {vertex}, by {outside})",
-        n=counted(len(rows), "weight", "is", "are", of=n_blends),
-        all=n_blends,
-        weight=rounded(float(found.place_weights[first]), 2),
-        joint=labels[int(found.place_joints[first])],
-        vertex=int(found.places[first]),
-        outside=rounded(float(outside[first]), 2),
-        vertices=found.places[rows],
-        joints=joints if len(joints) else np.unique(found.place_joints[rows]),
-        at=("weights", int(found.places[first])),
-    )
+def _blends_opposite(figure: Figure, pairs: Indices, fractions: Floats) -> Bools:
+    """Return which pairs of joints (P, 2) have counterparts with few hard edges: (P,).
+
+    ``fractions``: (P,), of the edges between the joints that are hard.
+    """
+    partners = name_partners(figure.require_skeleton())
+    known = {(a, b): float(part) for (a, b), part in zip(pairs.tolist(), fractions, strict=True)}
+    result = np.zeros(len(pairs), dtype=np.bool_)
+    for row, pair in enumerate(pairs.tolist()):
+        a, b = sorted(int(partners[joint]) for joint in pair)
+        result[row] = a >= 0 and (a, b) != tuple(pair) and known.get((a, b), 1.0) < _SOFT
+    return result

@@ -30,6 +30,7 @@ _SLICES, _SECTORS = 48, 8
 _THICK = 2.0  # thickness of a slice, in slices
 _FILLED = 7  # minimum number of sectors with skin: the slice is closed
 _INNER = 0.5  # maximum distance from the middle, relative to that of the skin in the same sector
+_FINEST = 6  # maximum number of steps along the edges of large triangles
 _FRAMES = 3  # minimum number of frames: one or two are a pop
 _MOSTLY = 0.5  # minimum weight of the trunk in its own vertices
 
@@ -124,13 +125,15 @@ def _trunk(figure: Figure) -> _Trunk | None:
     along = unit(turn @ (places[ends[0]] - places[names.index("pelvis")]))
     first = unit(np.cross(along, np.eye(3)[int(np.abs(along).argmin())]))
     axes = np.stack([first, np.cross(along, first), along])
-    points = (mesh.positions[vertices] - places[chests[0]]) @ turn.T @ axes.T
-    if len(points) < FEWEST:
+    points = (mesh.positions - places[chests[0]]) @ turn.T @ axes.T
+    corners = mesh.triangles[np.isin(mesh.triangles, vertices).all(axis=1)]
+    if len(vertices) < FEWEST or len(corners) == 0:
         return None
-    low, high = points[:, 2].min(), points[:, 2].max()
+    low, high = points[vertices, 2].min(), points[vertices, 2].max()
     thickness = float(high - low) / _SLICES
     if not thickness > 0.0:
         return None
+    points = _surface_points(points[corners], thickness)
     middles, radii = np.zeros((_SLICES, 2)), np.zeros((_SLICES, _SECTORS))
     for number in range(_SLICES):
         centre = low + (number + 0.5) * thickness
@@ -140,6 +143,14 @@ def _trunk(figure: Figure) -> _Trunk | None:
             to = part - middles[number]
             np.maximum.at(radii[number], _sectors(to), np.linalg.norm(to, axis=1))
     return _Trunk(chests[0], axes, float(low), thickness, middles, radii)
+
+
+def _surface_points(corners: Floats, spacing: float) -> Floats:
+    """Return points on triangles (T, 3, 3), about as far apart as given where these are large."""
+    edge = float(np.median(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)))
+    steps = int(np.clip(np.ceil(edge / spacing), 1, _FINEST))
+    grid = np.array([[i, j, steps - i - j] for i in range(steps + 1) for j in range(steps + 1 - i)])
+    return np.einsum("gk,tka->gta", grid / steps, corners).reshape(-1, 3)
 
 
 def _sectors(to: Floats) -> Indices:

@@ -21,7 +21,6 @@ _EDGES = 5.0
 _HEIGHT = 0.01  # smallest height that is seen, relative to the figure's size
 # In a symmetric mesh, a vertex whose neighbours all have counterparts, but which has none itself,
 # was moved on one side; artists leave some by up to 0.8 % of the size.
-_SYMMETRIC = 0.95  # minimum fraction of vertices with a counterpart
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -79,8 +78,6 @@ def _one_sided(
     (start, end), count = surface.edges.T, len(points)
     result = np.zeros(count, dtype=np.bool_)
     is_place = surface.place == np.arange(count)
-    if mirror.known.sum() < _SYMMETRIC * is_place.sum():
-        return result
     degree = np.bincount(start, minlength=count)
     known = np.bincount(start, mirror.known[end], minlength=count)
     alone = np.flatnonzero(is_place & ~mirror.known & (degree >= 3) & (known == degree))

@@ -37,6 +37,10 @@ _TWICE = 2.0  # maximum distance relative to the reach: weights of long bones en
 _STRONG = 0.05  # smallest weight of a stray that is seen at once
 _MANY = 8  # number of vertices whose smaller weights are seen together
 _TOGETHER = 256  # vertices whose distances from others are computed together
+# Of the same rigs, one has a group of up to three places with this much of a joint's weight that is
+# apart from all others of the joint, and blends with another one that is no neighbour of it.
+_ALONE, _ALONE_WEIGHT = 3, 0.2
+_ELSEWHERE = 20  # minimum number of the joint's other places
 _NEAR = 0.02  # distance from the bones within which all parts are near
 _OTHER_LIMB = 0.03  # minimum distance of a joint from the middle of what it moves by mistake
 _NEARER = 0.35  # maximum distance from the bones of the right joint, relative to the wrong one
@@ -77,6 +81,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     leaks = (beyond > _BEYOND) & (distances > _TWICE * reach[found.joints])
     n_far, n_own = (np.bincount(found.joints[k], minlength=len(reach)) for k in (leaks, mostly))
     stray |= leaks & (n_far > n_own)[found.joints]
+    stray |= _are_alone(found, surface, parents) & is_minor & (distances > _NEAR)
     stray &= ~np.isin(found.joints, swapped) & ~_are_adjacent(found, parents)
     if not stray.any():
         return
@@ -95,6 +100,32 @@ def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
     np.maximum.at(most, found.joints, score[parts])
     minor: Bools = score[parts] < most[found.joints]
     return minor
+
+
+def _are_alone(found: Support, surface: Surface, parents: Ints) -> Bools:
+    """Return which influences are of single places inside the region of another joint: (N,)."""
+    count = len(found.places)
+    part = components(count, found.links)
+    largest = np.zeros(count)
+    np.maximum.at(largest, part, found.place_weights)
+    n_places = np.bincount(part, minlength=count)
+    alone = (n_places <= _ALONE) & (largest > _ALONE_WEIGHT)
+    others = np.bincount(found.place_joints)[found.place_joints] >= _ELSEWHERE
+    n_edges = np.bincount(surface.edges[:, 0], minlength=len(surface.place))
+    rows = np.flatnonzero(alone[part] & others & (n_edges[found.places] >= 3))
+    # The joint that moves each place most; those of the surroundings must not be neighbours.
+    strongest = np.full(len(surface.place), -1)
+    order = np.argsort(found.place_weights, kind="stable")
+    strongest[found.places[order]] = found.place_joints[order]
+    starts, ends = surface.edges.T
+    is_alone = np.zeros(count, dtype=np.bool_)
+    for row in rows.tolist():
+        joint = int(found.place_joints[row])
+        first, last = np.searchsorted(starts, [found.places[row], found.places[row] + 1])
+        around = strongest[ends[first:last]]
+        is_alone[row] = not ((parents[around] == joint) | (around == parents[joint])).any()
+    result: Bools = is_alone[found.node]
+    return result
 
 
 def _are_adjacent(found: Support, parents: Ints) -> Bools:

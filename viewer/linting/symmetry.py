@@ -11,14 +11,23 @@ from viewer.errors import RigError
 from viewer.linting._finding import Finding
 from viewer.linting._mirror import Mirror, mirror_of, name_partners
 from viewer.linting._subject import Subject
+from viewer.linting.noise import noisy_sides
 from viewer.phrases import agree, counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import reflected
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.retargeting.joint_names import sided_words
 from viewer.rigs.retargeting.mirror import asymmetry, joint_partners
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_labels
-from viewer.rigs.skin import Skin, bind_positions, normalized, owners, row_norms
+from viewer.rigs.skin import (
+    Skin,
+    bind_positions,
+    moves_vertices,
+    normalized,
+    owners,
+    row_norms,
+)
 
 _MOVED = 1e-3  # minimum displacement that is reported as a note, as a fraction of the figure's size
 _ASKEW = 1e-2  # minimum visible displacement, as a fraction of the figure's size
@@ -32,7 +41,9 @@ _MOST = 0.6  # minimum fraction of a joint's vertices that differ
 _FEW_OFF = 0.4  # maximum fraction of the joints that are off: else the pose is asymmetric
 _BLENDS = 0.45  # maximum distance of a weight that blends from 0.5
 _FEWEST = 12  # minimum number of vertices of such a joint
-_UNLIKE = 0.03  # minimum distance of a joint from its counterpart's image
+_UNLIKE = 0.04  # minimum distance of a joint from the image of its counterpart: ears reach 0.036
+_ALIKE = 0.002  # maximum median of these distances: an asymmetric pose has larger ones
+_PAIRS = 6  # minimum number of joints with a counterpart
 _FEWER = 0.34  # maximum fraction of joints with the wrong name, or with other limits
 _SAME_LIMIT = 1e-3  # tolerance of limits, radians
 _SIDES = {"left": 1.0, "right": -1.0, "": 0.0}
@@ -45,9 +56,9 @@ def check(subject: Subject) -> Iterator[Finding]:
         yield from _limits(subject, figure.skeleton)
     is_whole = not subject.lacks("positions", "weights", "bindings", "joints")
     if figure.mesh is not None and figure.is_attached and is_whole:
+        yield from _joints(subject, figure)
         mirror = mirror_of(figure)
         if mirror is not None:
-            yield from _joints(subject, figure, mirror)
             yield from _names(subject, figure, mirror)
             if figure.symmetry is None:
                 yield from _sides(subject, figure, mirror)
@@ -149,7 +160,9 @@ def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding
     counts = mirror.known[vertices] & (np.abs(skin.weights - 0.5) < _BLENDS)
     total = np.bincount(skin.joints[counts], minlength=skeleton.n_joints)
     changed = np.bincount(skin.joints[counts & off[vertices]], minlength=skeleton.n_joints)
-    joints = np.flatnonzero((total >= _FEWEST) & (changed > _MOST * total) & is_sided)
+    joints = np.flatnonzero(
+        (total >= _FEWEST) & (changed > _MOST * total) & is_sided & ~noisy_sides(figure)
+    )
     if len(joints) == 0:
         return
     joints = joints[np.argsort(-changed[joints] / total[joints], kind="stable")]
@@ -169,25 +182,28 @@ def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding
     )
 
 
-def _joints(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:
+def _joints(subject: Subject, figure: Figure) -> Iterator[Finding]:
     """Report joints that are not at the mirrored position of their counterpart."""
     skin, skeleton = figure.require_skin(), figure.require_skeleton()
-    size, pairs = subject.size(), mirror.joints != np.arange(skeleton.n_joints)
-    pairs &= mirror.joints >= 0
-    # Only joints that move vertices with counterparts: tools and clothes may be on one side.
-    vertices = owners(skin)
-    weight = np.bincount(skin.joints, skin.weights, minlength=skeleton.n_joints)
-    known = np.bincount(
-        skin.joints, skin.weights * mirror.known[vertices], minlength=skeleton.n_joints
-    )
-    pairs &= (weight > 0.0) & (known > _MOST * weight)
-    off = np.flatnonzero(pairs & (mirror.errors > _UNLIKE * size))
-    if len(off) == 0 or np.median(mirror.errors[pairs]) > _ASKEW * size:
+    size, partners = subject.size(), name_partners(skeleton)
+    moves = moves_vertices(skin)
+    pairs = (partners >= 0) & (partners != np.arange(len(partners))) & moves & moves[partners]
+    if pairs.sum() < _PAIRS:
+        return
+    # The plane is that of most pairs, whatever the mesh is like: perpendicular to the axis along
+    # which they are apart, through the middle between them.
+    places = bind_positions(skin)
+    apart = np.abs(places - places[partners])[pairs]
+    axis = int(np.median(apart, axis=0).argmax())
+    centre = float(np.median(0.5 * (places + places[partners])[pairs, axis]))
+    errors = np.linalg.norm(reflected(places, axis, centre) - places[partners], axis=1)
+    off = np.flatnonzero(pairs & (errors > _UNLIKE * size))
+    if len(off) == 0 or np.median(errors[pairs]) > _ALIKE * size:
         return
     if len(off) > _FEW_OFF * pairs.sum():
         return  # the skeleton is in another pose than the mesh suggests
     # Of both joints, the one below a parent that is in its place is named.
-    off = off[np.argsort(-mirror.errors[off], kind="stable")]
+    off = off[np.argsort(-errors[off], kind="stable")]
     labels = joint_labels(skeleton)
     yield subject.found(
         "Y003.joints: {n} not at the mirrored position of {their}: {names} (worst: {joint} by "
@@ -196,7 +212,7 @@ def _joints(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Findin
         their=agree(len(off), "its counterpart", "their counterparts"),
         names=listed([labels[joint] for joint in off]),
         joint=labels[off[0]],
-        distance=subject.length(float(mirror.errors[off[0]])),
+        distance=subject.length(float(errors[off[0]])),
         joints=off,
         at=("bindings", int(off[0])),
     )
