@@ -24,6 +24,7 @@ NAMES = [
     "observing",
     "losses",
     "lint",
+    "faults",
     "feet",
     "transfer",
     "binding",
