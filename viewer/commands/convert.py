@@ -43,6 +43,7 @@ from viewer.exporters import (
     EXPORTERS,
     FOLDER,
     ExportOptions,
+    PageOptions,
     Part,
     SampledParts,
     Selection,
@@ -115,6 +116,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(group, ExportOptions, "safe_names")
     add_settings(group, ExportOptions, "digits", type=number)
     add_vrm_arguments(parser)
+    group = parser.add_argument_group("writing HTML pages")
+    add_settings(group, PageOptions, "caption", "wipes")
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
@@ -139,6 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
         gaps="interpolate" if asked.frames.interpolates else asked.frames.gaps,
         skinning=skinning,
         meta=settings_of(VrmMeta, arguments),
+        page=settings_of(PageOptions, arguments),
     )
     _check_suffix(asked, options, output, arguments.force)
     joint_map = None if arguments.save_joint_map is None else Path(arguments.save_joint_map)
@@ -174,6 +178,9 @@ def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, for
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
     if options.optimizes and not any("optimizes" in kind.options for kind in kinds):
         raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
+    if options.page != PageOptions() and not any("page" in kind.options for kind in kinds):
+        name = "--caption" if options.page.caption else "--wipe"
+        raise ViewerError(f"{name}: expected an output with .html, found {printable(suffix)}")
     check_meta(options.meta, output)
     _check_kind(options.kind, output)
     _check_numbered(bool(asked.frames.frames), output)

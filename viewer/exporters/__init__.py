@@ -13,7 +13,7 @@ from viewer.errors import RigError, UnsupportedFormatError
 from viewer.exporters._exporter import FOLDER, Content, Exporter, Part, SampledParts, Selection
 from viewer.exporters._left_out import motion_notes
 from viewer.exporters._motion_paths import files_at, is_together, part_files, part_paths
-from viewer.exporters._options import ExportOptions, VrmMeta
+from viewer.exporters._options import ExportOptions, PageOptions, VrmMeta
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import all_of, counted, printable
@@ -31,6 +31,7 @@ __all__ = [
     "FOLDER",
     "ExportOptions",
     "Exporter",
+    "PageOptions",
     "Part",
     "SampledParts",
     "Selection",
@@ -168,6 +169,7 @@ EXPORTERS = {
         stores_many=True,
         keeps_gaps=True,
         omits_hidden=True,
+        options=frozenset({"page"}),
     ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
@@ -323,6 +325,8 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
     kind, scene = EXPORTERS[key], selection.scene
     if options.optimizes and "optimizes" not in kind.options:
         raise UnsupportedFormatError(f"{path.suffix}: only glTF files can be optimised")
+    if options.page != PageOptions() and "page" not in kind.options:
+        raise UnsupportedFormatError(f"{path.suffix}: only pages have a caption and a divider")
     for part in selection.parts:
         if part.content not in kind.stores:
             raise UnsupportedFormatError(f"{path.name}: {key} files cannot store {part.content}")

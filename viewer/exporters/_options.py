@@ -58,6 +58,19 @@ class VrmMeta:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class PageOptions:
+    """What an HTML page shows besides its figures."""
+
+    caption: str = setting("", "text above the picture", metavar="TEXT")
+    wipes: bool = setting(
+        False,
+        "begin with a divider: the first figure on its left, the others on its right, in the same "
+        "place",
+        flag="--wipe",
+    )
+
+
 @dataclass(slots=True)
 class ExportOptions:
     """Options for writing poses and motions."""
@@ -106,6 +119,8 @@ class ExportOptions:
     )
     meta: VrmMeta = field(default_factory=VrmMeta)
     """Name, authors and licence of a VRM character."""
+    page: PageOptions = field(default_factory=PageOptions)
+    """Caption and divider of an HTML page."""
 
     @property
     def closing(self) -> GapHandling:

@@ -87,7 +87,7 @@ def placed(figures):
 
 def picture(browser):
     """Return the page's view as (H, W, 3)."""
-    browser.run("document.getElementById('display').hidden = true")
+    browser.run("document.getElementById('panels').hidden = true")
     browser.run("document.getElementById('timeline').hidden = true")
     browser.settle()
     return np.asarray(Image.open(io.BytesIO(browser.screenshot())).convert("RGB"), dtype=float)

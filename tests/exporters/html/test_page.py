@@ -320,7 +320,7 @@ def test_picture_matches_the_desktop(browser, tmp_path):
     """The same fox from the same camera: only edges and the contact shadow differ."""
     assert run(["convert", "-o", str(tmp_path / "fox.html")]) == 0
     browser.open(tmp_path / "fox.html")
-    browser.run("document.getElementById('display').hidden = true")
+    browser.run("document.getElementById('panels').hidden = true")
     browser.settle()
     found = np.asarray(Image.open(io.BytesIO(browser.screenshot())).convert("RGB"), dtype=float)
     height, width = found.shape[:2]

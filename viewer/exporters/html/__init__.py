@@ -30,7 +30,7 @@ from viewer.exporters._losses.largest_distances import REGULAR, evenly
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
 from viewer.exporters.html.figures import is_lit, pack_mesh, pack_skin, pack_studio, plain
-from viewer.exporters.html.motion import Tracks, pack_tracks, size_of, tracks_of
+from viewer.exporters.html.motion import Tracks, pack_dofs, pack_tracks, size_of, tracks_of
 from viewer.exporters.html.packing import Packer, unpacked
 from viewer.formats import save_text
 from viewer.phrases import counted, file_size, listed
@@ -59,7 +59,10 @@ from viewer.rigs.skinning import Skinning, skinned
 from viewer.rigs.srgb import decode_srgb
 
 _FOLDER = Path(__file__).resolve().parent
-_SCRIPTS = ("decode", "tracks", "drawing", "figure", "ground", "camera", "page")
+_SCRIPTS = (
+    *("decode", "joints", "tracks", "drawing", "figure", "ground", "camera"),
+    *("panels", "page"),
+)
 _SEEN = 9  # frames that the camera frames, at most
 _POSTER = (800, 450)
 # Ratios of width and height of which ``camera.js`` knows the distances that fit: 1 : 2 to 2 : 1.
@@ -68,11 +71,18 @@ _ASPECTS = 2.0 ** np.linspace(-1.0, 1.0, 13)
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write figures in their poses or with their frames, placed as in their scene."""
+    count, page_options = len(selection.parts), options.page
+    if page_options.wipes and count < 2:
+        raise RigError(f"divider of pages: expected at least 2 figures, found {count}")
     packer, shown = Packer(), list[_Shown]()
     first = min((each.start for each in selection.parts if each.frames is not None), default=0.0)
     for number, part in enumerate(selection.parts):
-        report(number, len(selection.parts), "figures")
+        report(number, count, "figures")
         shown.append(_shown(part, options, first))
+        if page_options.wipes and number:
+            together = part.actor.placement.copy()
+            together[:3, 3] = selection.parts[0].actor.placement[:3, 3]
+            shown[-1] = replace(shown[-1], actor=replace(part.actor, placement=together))
     how, texts = options.skinning, list[str]()
     packed = [each.pack(how, packer, texts) for each in shown]
     scene = selection.scene or Scene(selection.actors)
@@ -83,6 +93,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         "ramp": packer.add(ramp, 2.0**-12),
         "samplers": {**SAMPLERS, **STUDIO_SAMPLERS},
         "title": path.stem,
+        "wipes": page_options.wipes,
         "figures": [figure for figure, _ in packed],
         "programs": _programs([figure for figure, _ in packed]),
         "items": packer.items,
@@ -90,8 +101,8 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     if any(is_lit(figure) for figure, _ in packed):
         header["studio"] = pack_studio(packer)
     data = packer.text()
-    poster = _poster(scene, shown)
-    page = _page(header, data, poster, _description(shown))
+    poster = _poster(scene, shown[:1] if page_options.wipes else shown)
+    page = _page(header, data, poster, _description(shown), page_options.caption)
     save_text(path, page)
     arrays = unpacked(packer.items, data)
     notes = list[Diagnostic]()
@@ -166,6 +177,7 @@ class _Shown:
             packed["joints"] = {
                 "names": list(figure.skeleton.names),
                 "parents": figure.skeleton.parents.tolist(),
+                **pack_dofs(self.tracks, self.poses[0], packer),
             }
         if figure.mesh is not None and figure.mesh.n_vertices:
             packed["mesh"], center = pack_mesh(self.tracks, actor.hidden_parts, packer, notes)
@@ -348,7 +360,7 @@ def _description(shown: Sequence[_Shown]) -> str:
     return f"{names}: 3D view, {n_frames} frames" if n_frames > 1 else f"{names}: 3D view"
 
 
-def _page(header: Json, data: str, poster: str, description: str) -> str:
+def _page(header: Json, data: str, poster: str, description: str, caption: str) -> str:
     """Return the text of the page."""
     style = (_FOLDER / "page.css").read_text("utf-8")
     script = "\n".join((_FOLDER / f"{name}.js").read_text("utf-8") for name in _SCRIPTS)
@@ -367,6 +379,7 @@ def _page(header: Json, data: str, poster: str, description: str) -> str:
         "description": html.escape(description),
         "style": style,
         "poster": picture,
+        "caption": html.escape(caption),
         "header": text,
         "data": data,
         "script": script,

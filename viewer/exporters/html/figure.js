@@ -5,11 +5,14 @@ const EDGE_COLOR = [0.028, 0.039, 0.055, 0.55];      // premultiplied
 const BONE_COLOR = [0.81, 0.5, 0.09, 0.9], MARKED_COLOR = [0.9, 0.18, 0.1, 0.95];
 
 class Figure {
-  constructor(gl, programs, data, arrays, ramp, samplers) {
+  // ``before``: the figure of a lost context, whose state it keeps.
+  constructor(gl, programs, data, arrays, ramp, samplers, before = {}) {
     Object.assign(this, { gl, programs, data, arrays, ramp, samplers });
-    this.tracks = new Tracks(data, arrays);
-    this.isVisible = true;
+    this.tracks = before.tracks ?? new Tracks(data, arrays);
+    this.isVisible = before.isVisible ?? true;
     this.joint = -1;
+    this.side = before.side ?? "both";    // of the divider
+    this.shift = before.shift ?? [0, 0, 0];
     this.isReflected = false;
     this.center = [0, 0, 0];
     this.isAttached = Boolean(data.skin);
@@ -17,6 +20,22 @@ class Figure {
     if (data.mesh && data.skin) this.loadSkin(data.skin);
     this.boneBuffer = gl.createBuffer();
     this.boneArray = null;
+    if (before.joint >= 0) this.showWeights(before.joint);
+  }
+
+  // The matrix from the figure's space to the scene's.
+  get placement() { return product4(placed(this.shift), this.data.placement); }
+
+  // The mean of the joints, or the centre of a figure without joints, in scene space; see follow.py.
+  get place() {
+    const places = this.data.joints ? this.tracks.joints() : this.center, n = places.length / 3;
+    const [x, y, z] = [0, 1, 2].map((i) => {
+      let sum = 0;
+      for (let at = i; at < places.length; at += 3) sum += places[at];
+      return sum / n;
+    });
+    const m = product4(this.placement, this.model);
+    return [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
   }
 
   loadMesh(mesh) {
@@ -220,7 +239,7 @@ class Figure {
 
   // Uniforms of all programs that draw the figure.
   placing(camera) {
-    const model = product4(this.data.placement, product4(this.model, placed(this.center)));
+    const model = product4(this.placement, product4(this.model, placed(this.center)));
     const modelView = product4(camera.view, model);
     return { u_model_view: modelView, u_projection: camera.projection,
       u_normal_matrix: normalMatrix(modelView), u_orthographic: false };
@@ -228,18 +247,18 @@ class Figure {
 
   // Scene units per unit of the figure.
   get scale() {
-    return Math.cbrt(Math.abs(determinant(product4(this.data.placement, this.model))));
+    return Math.cbrt(Math.abs(determinant(product4(this.placement, this.model))));
   }
 
   // Whether placement, or most of the skinning, reflects the figure: its triangles are then
   // clockwise seen from their front.
   get isMirrored() {
-    return (determinant(this.data.placement) < 0) !== this.isReflected;
+    return (determinant(this.placement) < 0) !== this.isReflected;
   }
 
   // A sphere about the posed figure in scene space: its centre, and its radius.
   get bounds() {
-    const [x, y, z] = this.center, model = product4(this.data.placement, this.model);
+    const [x, y, z] = this.center, model = product4(this.placement, this.model);
     const at = [0, 1, 2].map((i) => model[i] * x + model[4 + i] * y + model[8 + i] * z + model[12 + i]);
     return [at, 0.8 * this.data.size * Math.hypot(model[0], model[1], model[2])];
   }

@@ -20,11 +20,13 @@ from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.figure import Figure
 from viewer.rigs.file_record import Json
 from viewer.rigs.geometry.quaternion import align_signs
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.material import Material
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
+from viewer.rigs.skeleton import FIRST_ROTATION
 from viewer.rigs.skin import Skin, bind_positions, owners
 from viewer.rigs.skinning import Skinning
 from viewer.rigs.skinning.dqs import split_palette
@@ -37,6 +39,7 @@ _EQUAL = 1e-9  # relative difference of lengths that counts as none
 _NORMAL_TOLERANCE = 2e-3  # of unit normals: 0.1 degrees
 _COARSEST_WEIGHT = 0.01
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
+_EVEN = 1e-4  # relative difference of scales, beyond the rounding of single-precision files
 _SCALE_STEP = 1e-7  # largest step of the scale of the whole figure
 
 
@@ -247,6 +250,44 @@ def pack_tracks(tracks: Tracks, packer: Packer) -> Json:
     if tracks.surface is not None:
         _pack_surface(tracks.surface, fine, packer, motion)
     return motion
+
+
+def pack_dofs(tracks: Tracks, pose: Pose | None, packer: Packer) -> Json:
+    """Add the rotation DOFs that sliders may change; return members of ``joints``, or none.
+
+    Sliders need joints whose rotations follow from their own DOFs, and which are scaled evenly:
+    then a rotation of a joint moves all below it by a rigid motion.
+    """
+    skeleton, skin = tracks.rest.require_skeleton(), tracks.rest.skin
+    if pose is None or skin is None or tracks.rotations.shape[1] != skeleton.n_joints:
+        return {}
+    binds = np.linalg.inv(skin.inverse_bind)[:, :3, :3]
+    sizes = np.cbrt(np.linalg.det(binds))
+    first, _, _, second, _, third = np.moveaxis(np.abs(tracks.stretches), -1, 0)
+    sides = tracks.stretches[..., [1, 2, 4]]
+    even = np.abs(np.stack([second - first, third - first, *np.moveaxis(sides, -1, 0)])) <= _EVEN
+    square = np.einsum("jba,jbc->jac", binds, binds) - sizes[:, None, None] ** 2 * np.eye(3)
+    is_even = even.all() and bool((np.abs(square) <= _EVEN * sizes[:, None, None] ** 2).all())
+    if skeleton.posing is not None or skeleton.constraints or not is_even or sizes.min() <= 0.0:
+        return {}
+    rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)
+    joints, axes = skeleton.dof_joints[rows], skeleton.dof_kinds[rows] - FIRST_ROTATION
+    # The angles about an axis that occurs twice do not follow from the rotation.
+    counts = np.zeros((skeleton.n_joints, 3), np.int32)
+    np.add.at(counts, (joints, axes), 1)
+    used = np.all(counts[joints] <= 1, axis=1)
+    if not used.any():
+        return {}
+    limits = np.clip(skeleton.dof_limits[rows[used]], -np.pi, np.pi)
+    return {
+        "binds": packer.add(matrix_to_quaternion(binds / sizes[:, None, None]), _FINEST),
+        "rests": packer.add(pose.rotations, _FINEST),
+        "dofs": {
+            "joints": joints[used].tolist(),
+            "axes": axes[used].tolist(),
+            "limits": limits.tolist(),
+        },
+    }
 
 
 def _pack_surface(surface: RestSurface, fine: float, packer: Packer, motion: Json) -> None:

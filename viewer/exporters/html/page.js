@@ -5,30 +5,42 @@ const element = (id) => document.getElementById(id);
 
 class Page {
   constructor(header, arrays) {
-    Object.assign(this, { header, arrays, time: 0, isPlaying: false });
+    Object.assign(this, { header, arrays, time: 0, isPlaying: false, divider: 0.5, followed: null });
     this.canvas = element("view");
     this.camera = new Camera(header);
     this.start();
     this.camera.listen(this.canvas, () => this.change());
     new ResizeObserver(() => this.change()).observe(this.canvas);
-    this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    this.canvas.addEventListener("webglcontextrestored", () => { this.start(); this.change(); });
-    this.connect();
+    this.canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      element("message").textContent = "The graphics card was reset; the view returns when it is ready.";
+    });
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      element("message").textContent = "";
+      this.start();
+      this.change();
+    });
+    this.panels = new Panels(this);
+    if (header.wipes) this.figures.forEach((each, i) => this.setSide(each, i ? "right" : "left"));
+    this.panels.choose();
+    this.panels.readAddress();
     this.change();
   }
 
-  // Makes everything on the graphics card.
+  // Makes everything on the graphics card; figures that were shown before keep their state.
   start() {
     const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: true });
     if (!gl) throw new Error("this browser or graphics card has no WebGL 2");
     this.gl = gl;
-    const programs = new Programs(gl, this.header.programs);
+    const programs = new Programs(gl, this.header.programs), before = this.figures || [];
     this.stage = new Stage(gl, programs, this.header);
     const ramp = Float32Array.from(this.arrays[this.header.ramp].values);
     const { figures, samplers, studio } = this.header;
-    this.figures = figures.map((data) => new Figure(gl, programs, data, this.arrays, ramp, samplers));
+    this.figures = figures.map((data, i) =>
+      new Figure(gl, programs, data, this.arrays, ramp, samplers, before[i]));
     if (studio) useStudio(gl, studio, this.arrays, samplers);
     this.end = Math.max(0, ...this.figures.map((figure) => figure.tracks.end));
+    if (this.followed) this.followed = this.figures[before.indexOf(this.followed)];
     this.posedAt = null;
   }
 
@@ -70,103 +82,93 @@ class Page {
     this.change();
   }
 
+  // Poses again, for changed joints.
+  repose() {
+    this.posedAt = null;
+    this.change();
+  }
+
   pose() {
     if (this.posedAt === this.time) return;
     for (const figure of this.figures) figure.pose(this.time);
     this.posedAt = this.time;
-    element("time").value = this.time;
-    element("shown").textContent = `${this.time.toFixed(2)} / ${this.end.toFixed(2)} s`;
+    this.panels.update();
+    if (!this.followed) return;
+    const place = this.followed.place;
+    this.camera.target = this.camera.target.map((x, i) => x + place[i] - this.followedAt[i]);
+    this.followedAt = place;
   }
+
+  // Keeps the camera at a figure; null for a camera that stays.
+  follow(figure) {
+    this.followed = figure;
+    if (figure) this.followedAt = figure.place;
+    this.change();
+  }
+
+  // Shows a figure on one side of the divider, or on both.
+  setSide(figure, side) {
+    figure.side = side;
+    const first = (which) => this.figures.find((each) => each.side === which);
+    const [left, right] = [first("left"), first("right")];
+    // Figures on the right stand where the first one on the left stands.
+    const shift = left && right
+      ? [12, 13, 14].map((i) => left.data.placement[i] - right.data.placement[i]) : [0, 0, 0];
+    for (const each of this.figures) each.shift = each.side === "right" ? shift : [0, 0, 0];
+    this.panels.showDivider();
+    this.change();
+  }
+
+  get isDivided() { return this.figures.some((each) => each.side !== "both"); }
 
   draw() {
     const gl = this.gl, canvas = this.canvas, ratio = Math.min(window.devicePixelRatio || 1, 2);
     if (gl.isContextLost()) return;
     const size = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(1, Math.round(x * ratio)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
-    this.camera.update(...size);
     this.pose();
-    const shows = (id) => element(id).checked;
+    this.camera.update(...size);
+    const edge = Math.round(this.divider * size[0]);
+    const parts = this.isDivided ? [["left", 0, edge], ["right", edge, size[0]]] : [["both", 0, size[0]]];
+    for (const [side, from, to] of parts) {
+      if (to === from) continue;
+      const shown = this.figures.filter((each) => each.side === side || each.side === "both");
+      this.drawPart(shown, size, from, to);
+    }
+    canvas.classList.add("ready");
+    element("poster")?.remove();
+  }
+
+  // Draws some figures in the columns of the image from one to another.
+  drawPart(figures, size, from, to) {
+    const gl = this.gl, shows = (id) => element(id).checked;
+    gl.disable(gl.SCISSOR_TEST);
     gl.disable(gl.BLEND);
     gl.enable(gl.DEPTH_TEST);
     gl.depthMask(true);
     gl.depthFunc(gl.LEQUAL);
-    const casters = shows("surface") ? this.figures : [];
+    const casters = shows("surface") ? figures : [];
     const shadow = this.stage.drawMap(casters, this.camera);
     gl.viewport(0, 0, ...size);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(from, 0, to - from, size[1]);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     this.stage.drawBackground();
     const lights = { ...this.header.lights, ...shadow, u_up: this.camera.up,
       u_to_studio: this.camera.toStudio };
-    if (shows("surface")) for (const each of this.figures) each.drawSurface(this.camera, lights, false);
-    if (shows("wireframe")) for (const each of this.figures) each.drawEdges(this.camera);
+    if (shows("surface")) for (const each of figures) each.drawSurface(this.camera, lights, false);
+    if (shows("wireframe")) for (const each of figures) each.drawEdges(this.camera);
     if (casters.length) this.stage.drawShadow(this.camera, shadow);
     if (shows("grid")) this.stage.drawGrid(this.camera);
     gl.depthMask(false);
-    if (shows("surface")) for (const each of this.figures) each.drawSurface(this.camera, lights, true);
+    if (shows("surface")) for (const each of figures) each.drawSurface(this.camera, lights, true);
     gl.disable(gl.DEPTH_TEST);
-    for (const each of this.figures)
+    for (const each of figures)
       if (shows("skeleton") || !each.data.mesh) each.drawSkeleton(this.camera);
     gl.enable(gl.DEPTH_TEST);
     gl.depthMask(true);
-    canvas.classList.add("ready");
-    element("poster")?.remove();
-  }
-
-  connect() {
-    const change = () => this.change();
-    for (const id of ["surface", "wireframe", "skeleton", "grid"])
-      element(id).addEventListener("change", change);
-    element("reset").addEventListener("click", () => { this.camera.reset(); change(); });
-    for (const [index, { name }] of this.header.figures.entries())
-      element("figure").append(new Option(name, index));
-    element("figure").addEventListener("change", () => this.choose());
-    element("visible").addEventListener("change", (event) => {
-      this.chosen.isVisible = event.target.checked;
-      change();
-    });
-    element("joint").addEventListener("change", (event) => {
-      this.chosen.showWeights(Number(event.target.value));
-      change();
-    });
-    this.choose();
-    element("timeline").hidden = this.end === 0;
-    element("time").max = this.end;
-    element("time").addEventListener("input", (event) => this.seek(Number(event.target.value)));
-    element("play").addEventListener("click", () => this.play(!this.isPlaying));
-    document.addEventListener("keydown", (event) => this.press(event));
-  }
-
-  get chosen() { return this.figures[Number(element("figure").value)]; }
-
-  // Shows the joints and the visibility of the chosen figure.
-  choose() {
-    const { chosen } = this, list = element("joint");
-    list.length = 1;
-    if (chosen.isAttached)
-      chosen.data.joints.names.forEach((name, joint) => list.append(new Option(name || `#${joint}`, joint)));
-    list.value = chosen.joint;
-    element("visible").checked = chosen.isVisible;
-  }
-
-  // Space plays; arrows step; letters switch the display; Home and End go to the ends.
-  press(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.target instanceof HTMLSelectElement) return;
-    const isButton = event.target instanceof HTMLButtonElement || event.target instanceof HTMLInputElement;
-    const step = 1 / Math.max(...this.header.figures.map((each) => each.motion.rate));
-    const toggle = (id) => { element(id).click(); };
-    const actions = {
-      ArrowLeft: () => this.seek(this.time - step), ArrowRight: () => this.seek(this.time + step),
-      Home: () => this.seek(0), End: () => this.seek(this.end),
-      w: () => toggle("wireframe"), s: () => toggle("skeleton"), g: () => toggle("grid"),
-      f: () => { this.camera.reset(); this.change(); },
-    };
-    if (!isButton) actions[" "] = () => this.play(!this.isPlaying);
-    if (!(event.key in actions)) return;
-    event.preventDefault();
-    actions[event.key]();
   }
 
   // Positions and unit normals of a figure's vertices at the current time, in its own space.

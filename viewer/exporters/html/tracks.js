@@ -10,6 +10,7 @@ class Tracks {
       ["model", "rotations", "places", "stretches", "joints", "weights", "fields", "present",
         "normalWeights", "normalFields", "recomputed"])
       if (name in this.motion) this.arrays[name] = arrays[this.motion[name]];
+    if (figure.joints?.dofs) this.edits = new JointEdits(figure.joints, arrays);
   }
 
   // Seconds from the start of the page's timeline to the last frame.
@@ -49,20 +50,38 @@ class Tracks {
 
   // Places of the skeleton's joints, figure space.
   joints() {
-    return this.arrays.joints ? this.at("joints") : this.arrays.places ? this.at("places") : [];
+    const { joints, places } = this.arrays, found = this.between(joints || places);
+    if (this.edits?.changed.size) {
+      this.edits.read(this.unitTurns());
+      moveAll(this.edits.motions(places ? this.at("places") : found), found);
+    }
+    return found;
+  }
+
+  // The rotations of the joints as unit quaternions.
+  unitTurns() {
+    const turns = this.at("rotations");
+    for (let at = 0; at < turns.length; at += 4) turns.set(normalized(turns.subarray(at, at + 4)), at);
+    return turns;
   }
 
   // Matrices of the joints about the centres of rest pose and pose; see posed_vertices.py.
   palette(restCenter) {
-    const places = this.at("places"), turns = this.at("rotations");
+    const places = this.at("places"), turns = this.unitTurns();
+    this.edits?.read(turns);
+    if (this.edits?.changed.size) {
+      const motions = this.edits.motions(places);
+      moveAll(motions, places);
+      motions.forEach(({ turn }, j) =>
+        turns.set(turned(turn, turns.subarray(4 * j, 4 * j + 4)), 4 * j));
+    }
     const stretches = this.arrays.stretches && this.at("stretches");
     const { binds, fractions } = this.skin, n = fractions.length;
     const linear = new Float64Array(9 * n), moved = new Float64Array(3 * n);
     const rotations = new Float64Array(9 * n), center = [0, 0, 0];
     let total = 0, orientation = 0;
     for (let j = 0; j < n; ++j) {
-      const q = normalized(turns.subarray(4 * j, 4 * j + 4));
-      turns.set(q, 4 * j);
+      const q = turns.subarray(4 * j, 4 * j + 4);
       const R = rotationOf(q), A = stretches ? product3(R, symmetric(stretches, 6 * j)) : R;
       rotations.set(R, 9 * j);
       linear.set(A, 9 * j);
