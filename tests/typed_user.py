@@ -1,0 +1,61 @@
+"""A user's script, which mypy checks but nobody runs: the types of the public names."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import viewer
+
+scene: viewer.Scene = viewer.load("walk.npz", Path("b.glb"), model="smplh", gender="female")
+person: viewer.Actor = scene["walk"]
+V: NDArray[np.float64] = person.vertices()
+J: NDArray[np.float64] = person.joints(time=1.2)
+still = person.at(1.2)
+still["left_knee"] = [1.2, 0, 0]
+still["left_knee"] = np.zeros(3)
+knee: NDArray[np.float64] = still["left_knee"]
+weights = np.zeros((3, 2))
+fig = viewer.figure(V[0], [[0, 1, 2]], weights=weights, joints=J, parents=[-1, 0], names=["a", "b"])
+fig2 = viewer.figure([[0, 0, 0]], np.zeros((0, 3), int), weights=(np.zeros((1, 2), int), weights))
+act = viewer.animate(fig, rotations=np.zeros((30, 2, 3)), translations=None, fps=30)
+act = viewer.animate(fig, np.zeros((30, 2, 4)), representation="quaternion", present=[True] * 30)
+notes: list[str] = [str(note) for note in viewer.export(act, "own.glb")]
+viewer.export(scene, "walk.bvh", frames=range(100), fps=30)
+image: NDArray[np.uint8] = viewer.render(
+    act,
+    time=0.5,
+    look_at="left_knee",
+    distance=0.8,
+    scalar="weight:left_knee",
+    background="white",
+    size=(1920, 1080),
+    quality="final",
+)
+viewer.video(scene, "walk.mp4", turntable=True)
+hero: viewer.Scene = viewer.retarget("walk.bvh", onto="hero.vrm", feet=False)
+rigged: viewer.Scene = viewer.rig("scan.obj", template="body", max_influences=4)
+clean: viewer.Scene = viewer.clean(act, smooth=True, lock_feet=True)
+found: viewer.Findings = viewer.lint(scene, ignore="W007")
+rows: list[dict[str, object]] = found.to_dicts()
+for finding in found:
+    code: str = finding.code
+    line: int | None = finding.line
+errors: viewer.Comparison = viewer.diff(scene, hero)
+numbers: list[float] = [errors.mpjpe, errors.pa_mpjpe, errors.pve, errors.foot_skate]
+pose: viewer.Pose = person.require_pose()
+pose.dofs[3] = 0.5
+if person.pose is not None:
+    person.pose.figure_scale = 2.0
+motion: viewer.MotionArrays = viewer.motion(person)
+points, normals = viewer.deform(person.figure, pose, viewer.Skinning(method="dqs"))
+options = viewer.DisplayOptions(wireframe=True, shading="pbr")
+camera = viewer.Camera(distance=8.0)
+viewer.render(scene, camera=camera, options=options)
+report: viewer.Report = viewer.batch("data/*.npz", "convert", "out", to="bvh")
+for actor in scene:
+    print(actor.name, len(scene), repr(actor))
+try:
+    viewer.load("nothing.glb")
+except viewer.ViewerError as problem:
+    print(problem)
