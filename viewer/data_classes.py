@@ -28,6 +28,10 @@ def setting(default: Any, help: str = "", **metadata: Any) -> Any:
     return dataclasses.field(**of, metadata={"help": help, **metadata})
 
 
+_MOST_NUMBERS = 16
+"""Numbers of an array in the text of an instance: a matrix, but no list of vertices."""
+
+
 class _Factory:
     """Default of parameters whose field has a factory."""
 
@@ -164,8 +168,19 @@ class _Signature:
 
 @recursive_repr()
 def _repr(self: Any) -> str:
-    shown = [f"{f.name}={getattr(self, f.name)!r}" for f in dataclasses.fields(self) if f.repr]
+    shown = [
+        f"{f.name}={_short(getattr(self, f.name))}" for f in dataclasses.fields(self) if f.repr
+    ]
     return f"{type(self).__qualname__}({', '.join(shown)})"
+
+
+def _short(value: Any) -> str:
+    """Return a value as text; of a large array, only its type and shape."""
+    # Anything with these is an array of numpy, which short commands do not import.
+    is_array = hasattr(value, "dtype") and hasattr(value, "shape")
+    if is_array and value.size > _MOST_NUMBERS:
+        return f"<{value.dtype} {value.shape}>"
+    return repr(value)
 
 
 def _values(names: list[str]) -> Callable[[object], Any]:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from formats.video_mocap.tool_files import body_model, gvhmr_file
 from numpy.testing import assert_allclose
 
 import viewer
@@ -217,3 +218,15 @@ def test_rig_binds_a_mesh_to_a_skeleton(tmp_path):
 def test_wrong_names_and_values_are_refused(call, message):
     with pytest.raises(ViewerError, match=message):
         call()
+
+
+@pytest.mark.parametrize("has_model", [False, True])
+def test_file_of_tensors_is_the_same_body_as_on_the_command_line(has_model, tmp_path, capsys):
+    """With a model, the 55 joints of SMPL-X; without one, the 24 of the bundled body."""
+    path, model = gvhmr_file(tmp_path), body_model("smplx", tmp_path) if has_model else None
+    words = ["--model", str(model)] if model is not None else []
+    assert run(["info", str(path), "--json", *words]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["actors"]
+    (actor,) = viewer.load(path, model=model)
+    assert actor.figure.skeleton.n_joints == told["skeleton"]["joints"] == (55 if has_model else 24)
+    assert actor.figure.mesh.n_vertices == told["mesh"]["vertices"]

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs.hand_made import mesh, skeleton
 
+import viewer
 from viewer.errors import RigError
 from viewer.formats.gltf.textures import transform_matrix
 from viewer.rigs.expressions import MaterialBinds
@@ -311,3 +312,10 @@ def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
 )
 def test_unit_of_a_similar_figure_is_inferred_from_its_size(unit, scale, expected):
     assert unit_of_scaled(unit, scale) == expected
+
+
+def test_description_is_one_line_without_numbers_of_vertices():
+    figure = viewer.load("body")[0].figure
+    shown = "<Figure body: 7813 vertices, 24 joints, 10 blend shapes; y up; unit m>"
+    assert repr(figure) == shown and repr(figure.mesh).count("\n") == 0
+    assert "positions=<float64 (7813, 3)>" in repr(figure.mesh)

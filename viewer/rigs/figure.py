@@ -10,6 +10,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
+from viewer.phrases import counted, printable
 from viewer.rigs.arrays import Floats, Ints, frozen
 from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.geometry.vectors import Up
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 
 FilePart: TypeAlias = Literal["mesh", "skeleton"]
 """A part of a figure that comes from one file: the mesh with its skin, or the skeleton."""
+
+
+_LONGEST = 60  # characters of a name in descriptions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +130,21 @@ class Figure:
                 f"figure {self.name}: the skin has {self.skin.n_joints} binding matrices, "
                 f"but the skeleton has {self.skeleton.n_joints} joints"
             )
+
+    def __repr__(self) -> str:
+        parts = list[str]()
+        if self.mesh is not None:
+            parts.append(counted(self.mesh.n_vertices, "vertex"))
+        if self.skeleton is not None:
+            parts.append(counted(self.skeleton.n_joints, "joint"))
+        if self.points is not None:
+            parts.append(counted(len(self.points.names), "point"))
+        if self.n_shapes:
+            parts.append(counted(self.n_shapes, "blend shape"))
+        if self.animations:
+            parts.append(counted(len(self.animations), "animation"))
+        unit = f"; unit {self.unit}" if self.unit else ""
+        return f"<Figure {printable(self.name, _LONGEST)}: {', '.join(parts)}; {self.up} up{unit}>"
 
     def origin_of(self, part: FilePart) -> Origin | None:
         """Return the file of a part that has not been edited since; None if there is none."""
