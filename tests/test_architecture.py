@@ -32,6 +32,7 @@ EVERYWHERE = {
     "near_names",
     "phrases",
     "progress",
+    "schemas",
     "version",
 }
 PARTS = {
@@ -68,6 +69,7 @@ LEAVES = {
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
     "progress": {"interrupts"},
+    "schemas": set(),
     "version": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {

@@ -37,7 +37,7 @@ hero: viewer.Scene = viewer.retarget("walk.bvh", onto="hero.vrm", feet=False)
 rigged: viewer.Scene = viewer.rig("scan.obj", template="body", max_influences=4)
 clean: viewer.Scene = viewer.clean(act, smooth=True, lock_feet=True)
 found: viewer.Findings = viewer.lint(scene, ignore="W007")
-rows: list[dict[str, object]] = found.to_dicts()
+codes: list[str] = [row["code"] for row in found.to_dicts()]
 for finding in found:
     code: str = finding.code
     line: int | None = finding.line

@@ -4,12 +4,15 @@ pages, ``test_pages.py`` fails if one is out of date.
 """
 
 import argparse
+import ast
 import re
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 import viewer
+from viewer import schemas
 from viewer.app.features import KEYS, MOUSE
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
@@ -150,10 +153,60 @@ def _names(action: argparse.Action) -> str:
     )
 
 
+def json_keys(kind: str) -> str:
+    """Return a table for each class of a kind of JSON data, the whole first."""
+    classes = {node.name: node for node in ast.parse(Path(schemas.__file__).read_text("utf-8")).body
+               if isinstance(node, ast.ClassDef)}  # fmt: skip
+    wanted, shown = [schemas.KINDS[kind].__name__], list[str]()
+    for name in wanted:  # the list grows
+        body, rows = classes[name].body, []
+        for place, node in enumerate(body):
+            if not isinstance(node, ast.AnnAssign):
+                continue
+            after = body[place + 1] if place + 1 < len(body) else None
+            is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            text = " ".join(str(after.value.value).split()) if is_text else ""
+            typed = ast.unparse(node.annotation)
+            wanted += [other for other in classes if re.search(rf"\b{other}\b", typed)
+                       and other not in wanted]  # fmt: skip
+            is_optional = typed.startswith("NotRequired[")
+            typed = typed[len("NotRequired[") : -1] if is_optional else typed
+            key = f"`{ast.unparse(node.target)}`" + " (not always)" * is_optional
+            rows.append((key, _json_type(typed), text))
+        title = ast.get_docstring(classes[name]) or ""
+        head = f"**{name.removesuffix('Data').lower()}**: {title[0].lower()}{title[1:]}\n\n"
+        shown.append(head + table(("key", "value", "meaning"), rows))
+    return "\n".join(shown).replace("``", "`")
+
+
+_JSON = {
+    **{"str": "text", "int": "integer", "float": "number", "bool": "true or false"},
+    **{"None": "null", "Any": "anything", "Severity": "note, warning or error"},
+}
+
+
+def _json_type(text: str) -> str:
+    """Return an annotation in words: ``list[float] | None`` is "list of number, or null"."""
+    if " | " in text and not text.endswith("]]"):
+        return ", or ".join(map(_json_type, text.split(" | ")))
+    inner = re.fullmatch(r"(\w+)\[(.*)\]", text)
+    if inner is None:
+        return _JSON.get(text, text.removesuffix("Data").lower())
+    if inner[1] == "list":
+        return f"list of {_json_type(inner[2])}"
+    if inner[1] == "dict":
+        return f"object of {_json_type(inner[2].removeprefix('str, '))}"
+    return ", ".join(part.strip("'") for part in inner[2].split(", "))
+
+
 TABLES = {
+    "batch_json": partial(json_keys, "batch/1"),
     "codes": codes,
     "commands": commands,
+    "diff_json": partial(json_keys, "diff/1"),
+    "info_json": partial(json_keys, "info/1"),
     "keys": keys,
+    "lint_json": partial(json_keys, "lint/1"),
     "methods": methods,
     "mouse": mouse,
     "options": options,

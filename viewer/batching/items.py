@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics.record import JsonObject
+
+if TYPE_CHECKING:
+    from viewer.schemas import DiagnosticData, SaidData
 
 Status = Literal["done", "failed", "timeout", "crashed", "memory", "cancelled", "unchanged"]
 
@@ -43,7 +46,7 @@ class Result:
     """1, or more if the item was retried."""
     message: str = ""
     """The error in one line; empty if there is none."""
-    diagnostics: list[JsonObject] = field(default_factory=list)
+    diagnostics: list[DiagnosticData | SaidData] = field(default_factory=list)
     """Warnings and losses, as ``lint --json`` writes them."""
     outputs: tuple[str, ...] = ()
     """Files and folders written."""

@@ -144,7 +144,7 @@ def _locked(handle: int) -> Iterator[None]:
 def _line(result: Result) -> str:
     """Return a result as one line of JSON; the item's fields come first."""
     item = {name: getattr(result.item, name) for name in _ITEM_NAMES}
-    found = item | {name: getattr(result, name) for name in _NAMES}
+    found = {"schema": "batch/1"} | item | {name: getattr(result, name) for name in _NAMES}
     found["seconds"] = round(result.seconds, 6)
     try:
         return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)

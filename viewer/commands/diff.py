@@ -16,6 +16,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.commands._frames import parse_range
 from viewer.commands._input_files import input_files
@@ -27,7 +28,7 @@ from viewer.commands._scene import PICTURES, print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, described, note
-from viewer.diagnostics.record import JsonObject, is_recorded, note_values
+from viewer.diagnostics.record import is_recorded, note_values
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
@@ -45,6 +46,9 @@ from viewer.rigs.scene import Actor, Motion, Scene, scene_of
 from viewer.rigs.skinning import Skinning
 from viewer.rigs.units import METRES
 from viewer.streams import require_stdout, summary_stream
+
+if TYPE_CHECKING:
+    from viewer.schemas import ComparisonData, DiffData, DifferenceData, PoseErrorData
 
 _DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
@@ -464,7 +468,7 @@ class Comparison:
             raise RigError(found)
         return found
 
-    def to_dict(self) -> JsonObject:
+    def to_dict(self) -> ComparisonData:
         """Return an entry of ``comparisons`` in the data of ``viewer diff --json``."""
         return _comparison_data(self, None)
 
@@ -561,18 +565,17 @@ def _cells(row: Comparison, tolerance: float | None) -> list[str]:
     return [*cells, ", ".join(result)]
 
 
-def _json_data(
-    reference: str, rows: Sequence[Comparison], tolerance: float | None
-) -> dict[str, object]:
+def _json_data(reference: str, rows: Sequence[Comparison], tolerance: float | None) -> DiffData:
     """Return the whole report as JSON data; lengths in the reference's unit, angles in radians."""
     return {
+        "schema": "diff/1",
         "reference": reference,
         "tolerance": tolerance,
         "comparisons": [_comparison_data(row, tolerance) for row in rows],
     }
 
 
-def _comparison_data(row: Comparison, tolerance: float | None) -> JsonObject:
+def _comparison_data(row: Comparison, tolerance: float | None) -> ComparisonData:
     pairs = zip(row.differences, row.pose_errors, strict=True)
     return {
         "name": row.name,
@@ -585,7 +588,7 @@ def _comparison_data(row: Comparison, tolerance: float | None) -> JsonObject:
     }
 
 
-def _actor(name: str, difference: Difference, errors: PoseErrors | str) -> JsonObject:
+def _actor(name: str, difference: Difference, errors: PoseErrors | str) -> DifferenceData:
     return {
         "name": name,
         "pose_errors": None if isinstance(errors, str) else _errors_data(errors),
@@ -613,13 +616,21 @@ def _actor(name: str, difference: Difference, errors: PoseErrors | str) -> JsonO
     }
 
 
-def _errors_data(errors: PoseErrors) -> JsonObject:
-    """Return errors of a motion as JSON data, which have no NaN."""
-    values = {name: getattr(errors, name) for name in _ERRORS}
+def _errors_data(errors: PoseErrors) -> PoseErrorData:
+    """Return errors of a motion as JSON data."""
     return {
-        **{name: value if math.isfinite(value) else None for name, value in values.items()},
+        "mpjpe": _finite(errors.mpjpe),
+        "pa_mpjpe": _finite(errors.pa_mpjpe),
+        "pve": _finite(errors.pve),
+        "acceleration": _finite(errors.acceleration),
+        "foot_skate": _finite(errors.foot_skate),
         "frames": errors.n_frames,
     }
+
+
+def _finite(value: float) -> float | None:
+    """Return a number, or None for NaN, which JSON lacks."""
+    return value if math.isfinite(value) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -81,6 +81,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> JsonObject:
     """Return the contents of a scene as JSON data; lengths in figure units, angles in radians."""
     how = skinning or Skinning()
     return {
+        "schema": "info/1",
         "actors": [
             _describe_actor(actor, scene.up) | {"model": _describe_model(actor, how)}
             for actor in scene.actors

@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 from viewer.commands._frames import rate
 from viewer.commands._keywords import arguments_of, paths_of, without_dashes
@@ -17,7 +17,7 @@ from viewer.commands._scene import add_capture_arguments, add_file_arguments, sc
 from viewer.commands._settings import add_settings, number, settings_of
 from viewer.commands._usage import require_files
 from viewer.data_classes import dataclass
-from viewer.diagnostics.record import JsonObject, note_values
+from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
 from viewer.linting import (
     CODES,
@@ -34,6 +34,9 @@ from viewer.linting import (
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rigs.scene import Actor, Scene, scene_of
+
+if TYPE_CHECKING:
+    from viewer.schemas import FindingData, LintData
 
 _FOUND = 1  # exit code if there are findings
 _STYLES = {"error": "red", "warning": "yellow"}
@@ -165,14 +168,13 @@ class Findings(Sequence[Finding]):
         """Findings that are errors, not warnings or notes."""
         return tuple(finding for finding in self.all if finding.severity == "error")
 
-    def to_dict(self) -> JsonObject:
+    def to_dict(self) -> LintData:
         """Return the data of ``viewer lint --json``; ``viewer help json`` describes them."""
         return describe(self.all, self.scene)
 
-    def to_dicts(self) -> list[JsonObject]:
+    def to_dicts(self) -> list[FindingData]:
         """Return the findings of ``to_dict``, one dict each: rows of a table."""
-        found: list[JsonObject] = self.to_dict()["findings"]
-        return found
+        return self.to_dict()["findings"]
 
     def __str__(self) -> str:
         return "\n".join([*map(finding_text, self.all), summary(self.all, self.n_files)])

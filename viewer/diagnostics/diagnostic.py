@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from viewer.diagnostics.codes import Severity
+    from viewer.schemas import DiagnosticData
 
 Part = Literal[
     "",
@@ -288,7 +289,7 @@ def _joined(alike: list[Diagnostic]) -> Diagnostic:
     return replace(alike[0], places=places, count=sum(one.count for one in alike))
 
 
-def described(found: Diagnostic) -> dict[str, Any]:
+def described(found: Diagnostic) -> DiagnosticData:
     """Return all data of a diagnostic, worded as for the command line, with at most 100 indices."""
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     with as_data():

@@ -14,6 +14,7 @@ from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from viewer.diagnostics.codes import Severity
+    from viewer.schemas import DiagnosticData, SaidData
 
 JsonObject: TypeAlias = dict[str, Any]
 """A description as JSON data: numbers, texts, lists and objects by name."""
@@ -23,7 +24,7 @@ JsonObject: TypeAlias = dict[str, Any]
 class Record:
     """Data of a run that is not in its printed text."""
 
-    diagnostics: list[JsonObject] = field(default_factory=list)
+    diagnostics: list[DiagnosticData | SaidData] = field(default_factory=list)
     """Warnings and notes as returned by ``described``; entries that are only text have just
     ``severity`` and ``message``."""
     found: list[Diagnostic] = field(default_factory=list)

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from viewer.diagnostics import SEVERITIES, Diagnostic, described
+from viewer.diagnostics import SEVERITIES, described
 from viewer.formats import folder_name
 from viewer.linting._finding import Finding
 from viewer.phrases import as_data, counted, printable
 from viewer.rigs.scene import Scene
 from viewer.rigs.skeleton import joint_labels
+
+if TYPE_CHECKING:
+    from viewer.schemas import FindingData, LintData
 
 _LISTED = 100  # maximum number of locations of a finding in JSON; the total is always included
 
@@ -47,12 +50,17 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
 
 
 @as_data()
-def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
+def describe(findings: Sequence[Finding], scene: Scene) -> LintData:
     """Return findings as data for JSON, worded as for the command line."""
     counts = Counter(finding.severity for finding in findings)
     return {
+        "schema": "lint/1",
         "findings": [_describe(finding, scene) for finding in findings],
-        "counts": {kind: counts[kind] for kind in reversed(SEVERITIES)},
+        "counts": {
+            "error": counts["error"],
+            "warning": counts["warning"],
+            "note": counts["note"],
+        },
         "bodies": [
             {
                 "name": printable(actor.name),
@@ -65,9 +73,10 @@ def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
     }
 
 
-def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
+def _describe(finding: Finding, scene: Scene) -> FindingData:
     has_file = finding.file is not None and finding.file != Path()
-    facts: dict[str, Any] = {
+    data = described(finding.diagnostic)
+    return {
         "code": finding.code,
         "severity": finding.severity,
         "title": finding.title,
@@ -79,20 +88,24 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
         "actor": finding.actor,
         "name": printable(finding.name),
         "animation": printable(finding.motion) or None,
-        **_data(finding.diagnostic),
+        "key": data["key"],
+        "part": data["part"],
+        "places": data["places"],
+        "n_places": data["n_places"],
+        "count": data["count"],
+        "values": data["values"],
+        "vertices": finding.vertices[:_LISTED].tolist(),
+        "n_vertices": len(finding.vertices),
+        "triangles": finding.triangles[:_LISTED].tolist(),
+        "n_triangles": len(finding.triangles),
+        "joints": finding.joints[:_LISTED].tolist(),
+        "n_joints": len(finding.joints),
+        "frames": finding.frames[:_LISTED].tolist(),
+        "n_frames": len(finding.frames),
+        "times": finding.times[:_LISTED].tolist(),
+        "n_times": len(finding.times),
+        "joint_names": _joint_names(finding, scene),
     }
-    for key in ("vertices", "triangles", "joints", "frames", "times"):
-        values = getattr(finding, key)
-        facts[key] = values[:_LISTED].tolist()
-        facts[f"n_{key}"] = len(values)
-    facts["joint_names"] = _joint_names(finding, scene)
-    return facts
-
-
-def _data(found: Diagnostic) -> dict[str, Any]:
-    """Return a diagnostic's data except its code, severity, message and file location."""
-    data = described(found)
-    return {key: data[key] for key in ("key", "part", "places", "n_places", "count", "values")}
 
 
 def _joint_names(finding: Finding, scene: Scene) -> list[str]:

@@ -30,6 +30,7 @@ PAGES = {
     "troubleshooting": "installation, drawing, exit codes",
     "keys": "reference: keys and shortcuts",
     "codes": "reference: findings of lint",
+    "json": "reference: data of --json and reports",
     "options": "reference: all commands and their options",
 }
 """Pages in this folder, without their suffix, and what they are about."""
