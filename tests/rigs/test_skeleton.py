@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from rigs.hand_made import skeleton
+from rig.hand_made import skeleton
 
 import viewer
 from viewer.errors import RigError
@@ -14,6 +14,7 @@ from viewer.rigs.inspection.single_vertices import vertex_facts
 from viewer.rigs.kinematics import posed_skeleton, skinning_matrices, world_matrices
 from viewer.rigs.memo import NumberKey
 from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion import instances
 from viewer.rigs.motion.instances import posed_worlds
 from viewer.rigs.pose import pose_key, pose_of
 from viewer.rigs.scalars._inputs import Asked
@@ -205,13 +206,14 @@ def actor():
 @pytest.fixture
 def runs(monkeypatch):
     """A counter of the runs of forward kinematics."""
-    counted, run = [], kinematics.forward_kinematics
+    counted, run = [], kinematics.joint_worlds
 
     def count(*args):
         counted.append(1)
         return run(*args)
 
-    monkeypatch.setattr("viewer.rigs.kinematics.forward_kinematics", count)
+    for module in (kinematics, instances):
+        monkeypatch.setattr(module, "joint_worlds", count)
     return counted
 
 

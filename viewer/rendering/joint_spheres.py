@@ -9,6 +9,7 @@ import numpy as np
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.memo import Memo
+from viewer.rigs.pose import batch_last
 from viewer.rigs.skin import Skin, bind_positions, owners
 
 _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
@@ -26,11 +27,14 @@ class Bounds(NamedTuple):
 
 def bounds_of(spheres: Floats) -> Bounds:
     """Return the bounds of actors by their spheres (A, N, 4), without those that are not finite."""
-    spheres = spheres[np.isfinite(spheres).all(axis=(1, 2))]
+    is_finite = np.isfinite(spheres)
+    if not is_finite.all():
+        spheres = spheres[is_finite.all(axis=(1, 2))]
     if not spheres.size:
         return Bounds(np.zeros((0, 4)), 0.0)
-    spans = np.ptp(spheres[..., :3], axis=1)
-    return Bounds(spheres.reshape(-1, 4), float(np.linalg.norm(spans, axis=1).max()))
+    parts = batch_last(spheres, 2).swapaxes(0, 1)  # (4, N, A)
+    spans = np.ptp(parts[:3], axis=1)
+    return Bounds(parts.reshape(4, -1).T, float(np.linalg.norm(spans, axis=0).max()))
 
 
 def skin_spheres(figure: Figure, palette: Floats, sizes: Floats | None = None) -> Floats:
@@ -46,12 +50,21 @@ def skin_spheres(figure: Figure, palette: Floats, sizes: Floats | None = None) -
     is_rigid = sizes is not None and bool((sizes > 0.0).all())
     stretches = np.sqrt(sizes) if sizes is not None and is_rigid else stretch_bounds(palette)
     stretches = np.broadcast_to(stretches, palette.shape[:-2])
-    used = radii >= 0.0
-    if not used.all():
-        palette, stretches = palette[..., used, :, :], stretches[..., used]
-        centers, radii = centers[used], radii[used]
-    moved = (palette[..., :3, :3] @ centers[..., None])[..., 0] + palette[..., :3, 3]
-    return np.concatenate([moved, (_MARGIN * radii * stretches)[..., None]], axis=-1)
+    used = np.flatnonzero(radii >= 0.0)
+    matrices = np.moveaxis(palette, (-1, -2, -3), (0, 1, 2))[:, :3, used]
+    spheres = np.empty((4, len(used), *palette.shape[:-3]))
+    spheres[:3] = np.einsum("kij...,jk->ij...", matrices[:3], centers[used]) + matrices[3]
+    spheres[3] = _MARGIN * (radii * stretches)[..., used].T
+    return spheres.T
+
+
+def moved_spheres(matrices: Floats, spheres: Floats) -> Floats:
+    """Return spheres (A, N, 4) after affine transforms (A, 4, 4), which may enlarge them."""
+    moved = np.empty(spheres.shape[::-1])
+    entries = batch_last(matrices, 2)[:3]
+    moved[:3] = np.einsum("ika,kna->ina", entries[:, :3], spheres.T[:3]) + entries[:, 3, None]
+    moved[3] = (spheres[..., 3] * stretch_bounds(matrices)[:, None]).T
+    return moved.T
 
 
 def stretch_bounds(matrices: Floats) -> Floats:

@@ -28,9 +28,7 @@ _bind_sizes: Memo[Skin, Floats] = Memo()
 
 
 def forward_kinematics(parents: Ints, local: Floats) -> Floats:
-    """Concatenate local matrices (J, 4, 4) down the hierarchy: W[j] = W[parent[j]] @ L[j].
-
-    Matrices of many poses are (J, F, n, n), and may be rotations alone.
+    """Concatenate local matrices (J, n, n) down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
     >>> local = np.stack([np.eye(4)] * 2)
     >>> local[:, 0, 3] = 2.0, 1.0
@@ -38,13 +36,6 @@ def forward_kinematics(parents: Ints, local: Floats) -> Floats:
     3.0
     """
     world = local.copy()
-    if local.ndim > 3:
-        # The matrices of one joint in many poses fill the caches, so one pass without copies is
-        # fastest.
-        for joint, parent in enumerate(parents.tolist()):
-            if parent >= 0:
-                np.matmul(world[parent], local[joint], out=world[joint])
-        return world
     parents = np.asarray(parents, dtype=np.int32)
     # Pointer doubling: every pass multiplies each joint's matrix by the matrix of the ancestor to
     # which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
@@ -60,15 +51,25 @@ def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
     shape = np.broadcast_shapes(linear.shape[:-2], offsets.shape[:-1])
     if len(shape) == 1:
         return forward_kinematics(parents, affine_matrices(linear, offsets))
-    # With the joint axis first, a joint's matrices of all poses lie together.
-    linear = np.swapaxes(np.broadcast_to(linear, (*shape, 3, 3)), 0, 1)
-    offsets = np.swapaxes(np.broadcast_to(offsets, (*shape, 3)), 0, 1)
-    return np.swapaxes(forward_kinematics(parents, affine_matrices(linear, offsets)), 0, 1)
+    # Columns and rows of each joint, (J, 4, 4, F): the numbers of all poses lie together.
+    linear = np.broadcast_to(linear, (*shape, 3, 3)).transpose(1, 3, 2, 0)
+    offsets = np.broadcast_to(offsets, (*shape, 3)).transpose(1, 2, 0)
+    world = np.empty((shape[1], 4, 4, shape[0]))
+    local = np.empty(world.shape[1:])  # of one joint: the processor's cache keeps it
+    world[:, :, 3] = local[:, 3] = [[0.0], [0.0], [0.0], [1.0]]
+    for joint, parent in enumerate(parents.tolist()):
+        local[:3, :3], local[3, :3] = linear[joint], offsets[joint]
+        if parent < 0:
+            world[joint] = local
+        else:
+            rows = world[joint, :, :3]
+            np.einsum("kif,ckf->cif", world[parent, :, :3], local, out=rows)
+    return world.transpose(3, 0, 2, 1)
 
 
 def world_rotations(parents: Ints, local: Floats) -> Floats:
     """Concatenate rotations (J, 3, 3) of one pose down the hierarchy."""
-    return forward_kinematics(parents, local[:, None])[:, 0]
+    return forward_kinematics(parents, local)
 
 
 def rest_world_rotations(skeleton: Skeleton) -> Floats:
@@ -114,8 +115,13 @@ def is_posed(skeleton: Skeleton, pose: Pose) -> bool:
 
 
 def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
-    """Return the skinning matrices (J, 4, 4), bind to posed: M[j] = W[j] inverse(B[j])."""
-    return world @ inverse_bind
+    """Return skinning matrices, ([F,] J, 4, 4), bind to posed: M[j] = W[j] inverse(B[j])."""
+    if world.ndim == 3:
+        return world @ inverse_bind
+    # The columns of a joint in all poses are the rows of one product: M^T = inverse(B)^T W^T.
+    columns = world.transpose(1, 3, 2, 0)
+    found = np.swapaxes(inverse_bind, 1, 2) @ columns.reshape(*columns.shape[:2], -1)
+    return found.reshape(columns.shape).transpose(3, 0, 2, 1)
 
 
 def rigid_sizes(palette: Floats) -> Floats:

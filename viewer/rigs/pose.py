@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.constraints.evaluation import constrained_matrices
-from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.rotation import quaternion_entries
 from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.memo import Memo, NumberKey
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
@@ -153,19 +153,32 @@ def local_transforms(
         first = (np.moveaxis(part, -2, 0) for part in (places, scales))
         turned = constrained_matrices(skeleton, np.moveaxis(rotations, -3, 0), *first)
         rotations = np.moveaxis(turned, 0, -3)
-    return rotations * scales[..., None, :], places
+    if (scales == 1.0).all():
+        return rotations, places
+    laid_out = np.moveaxis(batch_last(scales, 2), (0, 1), (-2, -1))
+    return rotations * laid_out[..., None, :], places
+
+
+def batch_last(values: Floats, own: int) -> Floats:
+    """Return values with their last ``own`` axes first, contiguous.
+
+    Numpy computes with the numbers of many poses several times faster if they are consecutive in
+    memory, not 3 or 9 at a time. Functions of many poses return views of such arrays.
+    """
+    return np.ascontiguousarray(np.moveaxis(values, range(-own, 0), range(own)))
 
 
 def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Floats:
     """Return the joints' offsets from their rest translations, DOFs included: (..., J, 3)."""
     shape = np.broadcast_shapes(translations.shape[:-2], dofs.shape[:-1])
-    offsets = np.broadcast_to(translations, (*shape, *translations.shape[-2:])).copy()
+    spread = np.broadcast_to(translations, (*shape, *translations.shape[-2:]))
+    first = np.moveaxis(spread, (-2, -1), (0, 1)).copy()
     moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
     if len(moves):
         # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
         entries = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
-        first = np.moveaxis(offsets, (-2, -1), (0, 1))
         np.add.at(first, entries, np.moveaxis(dofs[..., moves], -1, 0))
+    offsets = np.moveaxis(first, (0, 1), (-2, -1))
     if skeleton.posing is not None:
         offsets += skeleton.posing.translations(dofs)
     return offsets
@@ -173,7 +186,14 @@ def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Flo
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return R(quaternion) R(DOFs) relative to parents (J, 3, 3), without constraints."""
-    return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
+    return local_rotations(skeleton, pose.rotations, pose.dofs)
+
+
+def local_rotations(skeleton: Skeleton, quaternions: Floats, dofs: Floats) -> Floats:
+    """Return R(quaternion) R(DOFs) (..., J, 3, 3) of quaternions (..., J, 4) and DOFs (..., D)."""
+    beneath = quaternion_entries(*batch_last(quaternions, 2).swapaxes(0, 1))
+    turns = np.moveaxis(dof_rotations(skeleton, dofs), (-2, -1, -3), (0, 1, 2))
+    return np.moveaxis(np.einsum("ik...,kj...->ij...", beneath, turns), (0, 1, 2), (-2, -1, -3))
 
 
 def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
@@ -194,21 +214,29 @@ def _order_of(skeleton: Skeleton) -> _AxisProducts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Factor:
-    """One rotation of each of N joints: R = C + cos(a) D + sin(a) E, nine entries row by row."""
+    """A rotation about one axis, of joints that have no other in this factor."""
 
-    joints: _Indices | None  # None for all joints in order
+    axis: int
+    joints: _Indices | slice
     rows: _Indices
-    constant: Floats
-    cosines: Floats
-    sines: Floats
+    is_first: bool
+    """Whether it is the first rotation of its joints."""
 
-    def at(self, dofs: Floats) -> Floats:
-        """Return the rotations at DOFs (..., D): (..., N, 3, 3)."""
-        angles = dofs[..., self.rows, None]
-        entries = np.cos(angles) * self.cosines
-        entries += self.constant
-        entries += np.sin(angles) * self.sines
-        return entries.reshape(*entries.shape[:-1], 3, 3)
+    def apply(self, entries: Floats, dofs: Floats) -> None:
+        """Multiply matrices with entries (3, 3, J, ...) from the left, by DOFs (D, ...)."""
+        angles = dofs[self.rows]
+        cosines, sines = np.cos(angles), np.sin(angles)
+        first, second = (self.axis + 1) % 3, (self.axis + 2) % 3
+        if self.is_first:
+            entries[first, first, self.joints] = entries[second, second, self.joints] = cosines
+            entries[second, first, self.joints] = sines
+            entries[first, second, self.joints] = -sines
+            return
+        # Only two rows change: their new values are the old ones, rotated.
+        upper, lower = entries[first][:, self.joints], entries[second][:, self.joints]
+        moved = cosines * upper - sines * lower, sines * upper + cosines * lower
+        for row, values in zip((first, second), moved, strict=True):
+            entries[row][:, self.joints] = values
 
 
 class _AxisProducts:
@@ -219,34 +247,26 @@ class _AxisProducts:
 
     def at(self, dofs: Floats) -> Floats:
         """Return the products of rotation DOFs (..., D) as (..., J, 3, 3); identity without any."""
-        result: Floats | None = None
+        entries = np.zeros((3, 3, self._n_joints, *dofs.shape[:-1]))
+        for axis in range(3):
+            entries[axis, axis] = 1.0
+        moved = batch_last(dofs, 1)
         for factor in self._factors:
-            rotations = factor.at(dofs)
-            if factor.joints is None:
-                result = rotations if result is None else rotations @ result
-                continue
-            result = self._identities(dofs) if result is None else result
-            result[..., factor.joints, :, :] = rotations @ result[..., factor.joints, :, :]
-        return self._identities(dofs) if result is None else result
-
-    def _identities(self, dofs: Floats) -> Floats:
-        return np.broadcast_to(np.eye(3), (*dofs.shape[:-1], self._n_joints, 3, 3)).copy()
+            factor.apply(entries, moved)
+        return np.moveaxis(entries, (0, 1, 2), (-2, -1, -3))
 
 
 def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: _Indices) -> _AxisProducts:
     """Order rotations (N,) about ``axes`` 0 to 2 for multiplication, a joint's first row first."""
     factors = []
-    for chosen in _by_rank(joints):
-        matrices = np.zeros((3, len(chosen), 9))  # constant, cosines, sines
-        number, axis = np.arange(len(chosen)), axes[chosen]
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        matrices[0, number, 4 * axis] = 1.0
-        matrices[1, number, 4 * first] = matrices[1, number, 4 * second] = 1.0
-        matrices[2, number, 3 * second + first] = 1.0
-        matrices[2, number, 3 * first + second] = -1.0
-        of_rank = joints[chosen].astype(np.intp)
-        every = np.array_equal(of_rank, np.arange(n_joints))
-        factors.append(_Factor(None if every else of_rank, rows[chosen], *matrices))
+    for rank, of_rank in enumerate(_by_rank(joints)):
+        for axis in range(3):
+            chosen = of_rank[axes[of_rank] == axis]
+            if len(chosen):
+                turned = joints[chosen].astype(np.intp)
+                every = np.array_equal(turned, np.arange(n_joints))
+                where = slice(None) if every else turned
+                factors.append(_Factor(axis, where, rows[chosen], rank == 0))
     return _AxisProducts(n_joints, factors)
 
 

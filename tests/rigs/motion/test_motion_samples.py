@@ -10,8 +10,8 @@ from formats.synthetic_smpl import joint_parents, model
 from formats.video_mocap.tool_files import matrices, scene_of, vertices, wham, wham_file
 from numpy.testing import assert_allclose, assert_array_equal
 from rendering.moving import MISSING, RATE, SPEED, moving_arm
-from rigs.animated import about, channel, clip_of
-from rigs.hand_made import skeleton
+from rig.animated import about, channel, clip_of
+from rig.hand_made import skeleton
 
 import viewer
 from viewer.errors import RigError
@@ -22,12 +22,12 @@ from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.kinematics import skinning_matrices, world_matrices
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.motion.evaluation import Frames, world_frames
-from viewer.rigs.motion.instances import local_rotations, placements, pose_arrays, worlds
+from viewer.rigs.motion.instances import placements, pose_arrays, worlds
 from viewer.rigs.motion.motion_paths import motion_path, path_times, segments
 from viewer.rigs.motion.onion import FAINTEST, onion
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, rest_pose
+from viewer.rigs.pose import Pose, joint_rotations, local_rotations, placement_matrix, rest_pose
 from viewer.rigs.scene import Actor, Scene, pose_actors, still_pose
 from viewer.rigs.shape import shaped
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
@@ -359,9 +359,10 @@ def random_poses(joints: Skeleton, count: int) -> list[Pose]:
 def test_batched_matrices_match_each_pose():
     joints = moving_skeleton()
     poses = random_poses(joints, 7)
+    arrays = pose_arrays(poses)
     rotations, found, places = (
-        local_rotations(joints, pose_arrays(poses)),
-        worlds(joints, pose_arrays(poses)),
+        local_rotations(joints, arrays.rotations, arrays.dofs),
+        worlds(joints, arrays),
         placements(poses),
     )
     assert found.shape == (7, 4, 4, 4)

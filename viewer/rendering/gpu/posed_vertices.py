@@ -132,11 +132,11 @@ class PosedVertices:
         """Turn M into T(-posed centre) M T(rest centre), in place; return posed centres (C, 3)."""
         # The posed centre is the mean motion of the figure, by its weights: what is left is small.
         linear, places = matrices[..., :3, :3], matrices[..., :3, 3]
-        places += linear @ self.mesh.center
+        places += np.einsum("ajik,k->aji", linear, self.mesh.center)
         fractions = self.mesh.skin(how).joint_fractions
         centers: Floats = np.broadcast_to(self.mesh.center, (len(matrices), 3))
         if fractions.any():
-            centers = fractions @ places
+            centers = np.einsum("j,aji->ai", fractions, places)
         places -= centers[:, None]
         return centers
 

@@ -20,7 +20,13 @@ from viewer.rendering.gpu.posed_vertices import PosedVertices, skinning_options_
 from viewer.rendering.gpu.program import POSED_BINDING, Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform, float32, reserved
 from viewer.rendering.gpu.vertex_arrays import Source, VertexArrays
-from viewer.rendering.joint_spheres import Bounds, bounds_of, skin_spheres, stretch_bounds
+from viewer.rendering.joint_spheres import (
+    Bounds,
+    bounds_of,
+    moved_spheres,
+    skin_spheres,
+    stretch_bounds,
+)
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
@@ -34,8 +40,8 @@ from viewer.rendering.view import View, set_lights
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import palette_sizes, skinning_matrices
-from viewer.rigs.motion.instances import PoseTable, local_rotations, placements, worlds
-from viewer.rigs.pose import Pose
+from viewer.rigs.motion.instances import PoseTable, placements, worlds
+from viewer.rigs.pose import Pose, local_rotations
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights, shaped
 from viewer.rigs.skinning import Skinning
@@ -220,12 +226,12 @@ class InstanceBuffers:
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         skeleton, skin = figure.require_skeleton(), figure.require_skin()
         arrays = self._table.arrays.rows(rows)
-        rotations = local_rotations(skeleton, arrays)
+        rotations = local_rotations(skeleton, arrays.rotations, arrays.dofs)
         matrices = skinning_matrices(worlds(skeleton, arrays, rotations), skin.inverse_bind)
         sizes = palette_sizes(skin, arrays.scales, matrices)
         spheres = skin_spheres(figure, matrices, sizes)
         if self._spheres.shape[:2] != (self.count, spheres.shape[1]):
-            self._spheres = np.zeros((self.count, *spheres.shape[1:]))
+            self._spheres = np.zeros((4, spheres.shape[1], self.count)).T
             self._has_one_side = np.zeros(self.count, dtype=np.bool_)
         self._spheres[rows] = spheres
         weights = None
@@ -262,10 +268,7 @@ class InstanceBuffers:
     def bounds(self) -> Bounds:
         """Return the bounds of the vertices in scene space."""
         if self._bounds is None:
-            linear, shifts = self._models[:, None, :3, :3], self._models[:, None, :3, 3]
-            centers = (linear @ self._spheres[..., :3, None])[..., 0] + shifts
-            radii = self._spheres[..., 3] * stretch_bounds(self._models)[:, None]
-            self._bounds = bounds_of(np.concatenate([centers, radii[..., None]], axis=-1))
+            self._bounds = bounds_of(moved_spheres(self._models, self._spheres))
         return self._bounds
 
     @property

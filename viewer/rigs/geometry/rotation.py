@@ -23,20 +23,24 @@ def axis_rotations(axis: int, angles: Floats) -> Floats:
 
 def quaternion_to_matrix(quaternions: Floats) -> Floats:
     """Return the matrices of quaternions of any length, R v = q v q* / |q|^2 (Shoemake 1985)."""
-    quaternions = np.asarray(quaternions, dtype=np.float64)
-    x, y, z, w = (quaternions[..., number] for number in range(4))
+    entries = quaternion_entries(*np.moveaxis(np.asarray(quaternions, dtype=np.float64), -1, 0))
+    return np.ascontiguousarray(np.moveaxis(entries, (0, 1), (-2, -1)))
+
+
+def quaternion_entries(x: Floats, y: Floats, z: Floats, w: Floats) -> Floats:
+    """Return the entries (3, 3, ...) of ``quaternion_to_matrix``, one entry of all together."""
     scale = 2.0 / (x * x + y * y + z * z + w * w)
-    matrices = np.empty((*x.shape, 3, 3))
-    matrices[..., 0, 0] = 1.0 - scale * (y * y + z * z)
-    matrices[..., 0, 1] = scale * (x * y - z * w)
-    matrices[..., 0, 2] = scale * (x * z + y * w)
-    matrices[..., 1, 0] = scale * (x * y + z * w)
-    matrices[..., 1, 1] = 1.0 - scale * (x * x + z * z)
-    matrices[..., 1, 2] = scale * (y * z - x * w)
-    matrices[..., 2, 0] = scale * (x * z - y * w)
-    matrices[..., 2, 1] = scale * (y * z + x * w)
-    matrices[..., 2, 2] = 1.0 - scale * (x * x + y * y)
-    return matrices
+    entries = np.empty((3, 3, *x.shape))
+    entries[0, 0] = 1.0 - scale * (y * y + z * z)
+    entries[0, 1] = scale * (x * y - z * w)
+    entries[0, 2] = scale * (x * z + y * w)
+    entries[1, 0] = scale * (x * y + z * w)
+    entries[1, 1] = 1.0 - scale * (x * x + z * z)
+    entries[1, 2] = scale * (y * z - x * w)
+    entries[2, 0] = scale * (x * z - y * w)
+    entries[2, 1] = scale * (y * z + x * w)
+    entries[2, 2] = 1.0 - scale * (x * x + y * y)
+    return entries
 
 
 def rotation_vector_to_matrix(vectors: Floats) -> Floats:

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rigs.arrays import Bools, Floats
-from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.kinematics import (
     is_posed,
     joint_worlds,
     posed_skeleton,
 )
-from viewer.rigs.pose import Pose, PosedSkeleton, dof_rotations, local_transforms
+from viewer.rigs.pose import Pose, PosedSkeleton, local_rotations, local_transforms
 from viewer.rigs.skeleton import Skeleton
 
 
@@ -84,14 +83,10 @@ class PoseTable:
         return changed
 
 
-def local_rotations(skeleton: Skeleton, poses: PoseArrays) -> Floats:
-    """Return R(quaternion) R(DOFs) of each pose's joints (A, J, 3, 3)."""
-    return quaternion_to_matrix(poses.rotations) @ dof_rotations(skeleton, poses.dofs)
-
-
 def worlds(skeleton: Skeleton, poses: PoseArrays, rotations: Floats | None = None) -> Floats:
     """Return poses' world matrices (A, J, 4, 4); ``rotations``: their local ones, if known."""
-    rotations = local_rotations(skeleton, poses) if rotations is None else rotations
+    if rotations is None:
+        rotations = local_rotations(skeleton, poses.rotations, poses.dofs)
     moved = local_transforms(skeleton, rotations, poses.dofs, poses.translations, poses.scales)
     return joint_worlds(skeleton.parents, *moved)
 
