@@ -17,6 +17,7 @@ from measure import interleaved, median_ratio, report
 import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.gpu.context import is_software
+from viewer.rendering.lineup import Group, Lineup, lineup
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers, draw_instances
@@ -92,12 +93,19 @@ def draws(figure: Figure, samples: int, rounds: int) -> None:
         instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
         target.framebuffer.use()
         instances.vertices.reserve(COUNT)
-        instances.update(scene.actors, Skinning())
+        drawn = lineup(scene.actors, options, Lineup())
+        group = Group(*drawn.crowds.values(), np.arange(COUNT), scene.actors)
+
+        def update() -> None:
+            lineup(scene.actors, options, drawn)
+            instances.update(group, Skinning())
+
+        update()
         still = still_draw(offscreen.context, instances, view, options)
 
         def skinned() -> None:
             change(scene.actors, rng)
-            instances.update(scene.actors, Skinning())
+            update()
             posed()
 
         # The static copies have no bounds by which hidden back faces could be skipped.
@@ -201,11 +209,14 @@ def processor(count: int, rounds: int) -> None:
         instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
         instances.vertices.reserve(count)
         instances.vertices._run = lambda *_: None  # leaves out the work of the driver
+        drawn = lineup(actors, DisplayOptions(), Lineup())
+        group = Group(*drawn.crowds.values(), np.arange(count), actors)
 
         def update(moves: bool) -> None:
             if moves:
                 change(actors, rng)
-            instances.update(actors, Skinning())
+            lineup(actors, DisplayOptions(), drawn)
+            instances.update(group, Skinning())
 
         work = {"moving": lambda: update(True), "still": lambda: update(False)}
         times = interleaved(work, rounds, time.thread_time)

@@ -1,9 +1,12 @@
 """Figures for rendering tests: random figures with any number of joints, and simple solids."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.rendering.lineup import Crowd, Group, Lineup, is_culled, lineup
+from viewer.rendering.options import DisplayOptions
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.material import Material, Texture
@@ -183,3 +186,24 @@ def bent(figure: Figure, *turns: tuple[int, str, float]) -> Actor:
 def scene_of(*meshes: Mesh) -> Scene:
     """Return a scene of meshes without skeletons."""
     return Scene([Actor(Figure(f"mesh {i}", mesh)) for i, mesh in enumerate(meshes)])
+
+
+def group_of(actors: Sequence[Actor], known: Group | None = None) -> Group:
+    """Return actors as one group that is up to date: the known one if it has the same actors."""
+    shapes = [actor.pose.shape_weights.tolist() for actor in actors]
+    assert shapes.count(shapes[0]) == len(shapes)
+    is_other = known is not None and known.crowd.shape_weights.tolist() != shapes[0]
+    if known is None or is_other or known.actors != list(actors):
+        known = Group(Crowd(list(actors)), np.arange(len(actors)), list(actors))
+    known.crowd.poses = [actor.pose for actor in actors]
+    known.crowd.update()
+    return known
+
+
+def groups_of(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
+    """Return the actors that are drawn together."""
+    return [
+        group.actors
+        for crowd in lineup(actors, options, Lineup()).crowds.values()
+        for group in crowd.groups(is_culled(crowd.actors[0].figure, options), 1000)
+    ]

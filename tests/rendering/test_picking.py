@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rendering.drawn_figures import arm, bent, skeleton, square
+from rendering.drawn_figures import arm, bent, groups_of, skeleton, square
 from rendering.front_view import PIXELS, grid_figure
 
+from viewer.rendering import lineup
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass
 from viewer.rigs.annotations import Keypoints, ReducedMesh
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
@@ -176,7 +176,7 @@ def test_keypoint_within_two_pixels_takes_precedence_over_the_surface_behind_it(
 
 @pytest.mark.parametrize("count", [3, 12])
 def test_instances_are_distinguished(offscreen, monkeypatch, count):
-    monkeypatch.setattr(instance_pass, "FEWEST", 4)
+    monkeypatch.setattr(lineup, "FEWEST", 4)
     figure = arm(2)
     actors = []
     for number in range(count):
@@ -187,7 +187,7 @@ def test_instances_are_distinguished(offscreen, monkeypatch, count):
     other = Actor(replace(figure, name="other"))
     other.placement[:3, 3] = -1.0, 1.6, 0.0
     scene = Scene([other, *actors])
-    assert len(instance_pass.instance_groups(scene.actors, DisplayOptions())) == (count > 4)
+    assert len(groups_of(scene.actors, DisplayOptions())) == (count > 4)
     for number, actor in enumerate(actors):
         x, y = actor.placement[:2, 3]
         found = click(offscreen, scene, x + 0.05, y, size=(400, 400))

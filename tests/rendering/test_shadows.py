@@ -16,10 +16,10 @@ from rendering.drawn_figures import (
 from rendering.golden_motion import SHOTS
 from rendering.plain_pictures import N, front, lights, plain
 
+from viewer.rendering import lineup
 from viewer.rendering.casters import spheres_of
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass
 from viewer.rendering.sampling import limit_passes, time_note
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
@@ -168,7 +168,7 @@ def test_instances_cast_the_same_shadows(offscreen, monkeypatch):
     options = replace(shot.options, quality="normal", samples=1)
     box = scene_box(shot.scene)
     together = offscreen.render(shot.scene, (N, N), shot.camera, options, box)
-    monkeypatch.setattr(instance_pass, "FEWEST", 100)
+    monkeypatch.setattr(lineup, "FEWEST", 100)
     alone = offscreen.render(shot.scene, (N, N), shot.camera, options, box)
     assert (np.abs(together.astype(int) - alone).max(axis=2) > 8).mean() < 0.005
 

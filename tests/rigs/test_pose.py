@@ -5,7 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs.hand_made import matrix, plain_kinematics, skeleton, turn_x, turn_y, turn_z
 
-from viewer.rigs.kinematics import forward_kinematics, skinning_matrices, world_matrices
+from viewer.rigs.kinematics import (
+    forward_kinematics,
+    joint_worlds,
+    skinning_matrices,
+    world_matrices,
+)
 from viewer.rigs.pose import local_matrices, rest_pose
 
 ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
@@ -193,3 +198,15 @@ def test_skinning_matrices_are_the_identity_where_the_skin_was_bound():
     world = random_locals(5, 4)
     palette = skinning_matrices(world, np.linalg.inv(world))
     assert_allclose(palette, np.tile(np.eye(4), (5, 1, 1)), atol=1e-14)
+
+
+def test_many_poses_of_joints_in_any_order_equal_the_direct_products():
+    """Joints 1 and 3 come before their parents; joint 4 is a second root."""
+    parents = np.array([-1, 3, 0, 2, -1, 4], dtype=np.int32)
+    local = np.stack([random_locals(6, seed) for seed in range(3)])
+    found = joint_worlds(parents, local[..., :3, :3], local[..., :3, 3])
+    for pose, world in zip(local, found, strict=True):
+        expected = pose.copy()
+        for joint in (2, 3, 1, 5):
+            expected[joint] = expected[parents[joint]] @ pose[joint]
+        assert_allclose(world, expected, atol=1e-13)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.hand_made import skeleton
+from rigs.hand_made import skeleton
 
 import viewer
 from viewer.errors import RigError

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import moderngl
 import numpy as np
 
@@ -18,20 +16,14 @@ from viewer.rendering.joint_spheres import (
     skin_spheres,
     stretch_bounds,
 )
+from viewer.rendering.lineup import Lineup, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.view import View
-from viewer.rendering.visibility import (
-    Meshes,
-    placement_of,
-    shows_mesh,
-    shows_skeleton,
-    with_points,
-    with_skeleton,
-)
+from viewer.rendering.visibility import Meshes
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import posed_skeleton
@@ -55,8 +47,8 @@ class Casters:
     """Programs and passes for drawing, and the drawn buffers."""
     meshes: Meshes
     """Surfaces."""
-    actors: Sequence[Actor]
-    """All actors of the scene."""
+    lineup: Lineup
+    """The drawn actors."""
     options: DisplayOptions
     threshold: float = 0.5
     """Actors with at most this opacity are omitted, 0 to 1. Averaged over passes with evenly spread
@@ -75,12 +67,12 @@ class Casters:
             how = view, options, fragment, self._prepare
             draw_instance_shapes(self.programs, instances, *how)
         # Over a skin, a skeleton is an overlay and casts no shadow.
-        for actor in with_skeleton(self.actors, options):
+        for actor in self.lineup.skeletons:
             if self._blocks(actor) and not shows_mesh(actor.figure, options):
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
                 program = joint_program(self.programs, skeleton, options, "", fragment)
                 draw_joints(program, skeleton, placement, view, options)
-        for actor in with_points(self.actors, options):
+        for actor in self.lineup.points:
             if self._blocks(actor):
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
@@ -100,7 +92,7 @@ class Casters:
             mesh_size(instances.mesh.figure) * instances.largest_scale
             for _, instances in self.meshes.instanced
         ]
-        for actor in self._alone():
+        for actor in self.lineup.alone:
             if actor.figure.mesh is not None:
                 scale = float(stretch_bounds(placement_of(actor, self.options)))
                 sizes.append(mesh_size(actor.figure) * scale)
@@ -109,20 +101,9 @@ class Casters:
     def bounds(self) -> list[Bounds]:
         """Return the bounds of all drawn actors, without those whose pose is not finite."""
         found = [instances.bounds() for _, instances in self.meshes.instanced]
-        beside = [
-            actor
-            for actors, _ in self.meshes.instanced
-            if self.options.show == "both" or any(actor.points is not None for actor in actors)
-            for actor in actors
-        ]
-        for actor in (*self._alone(), *beside):
+        for actor in (*self.lineup.alone, *self.lineup.beside):
             found.append(bounds_of(spheres_of(actor, self.options)[None]))
         return [one for one in found if len(one.spheres)]
-
-    def _alone(self) -> list[Actor]:
-        """Return the drawn actors whose meshes are not drawn as instances."""
-        together = {id(actor) for actors, _ in self.meshes.instanced for actor in actors}
-        return [actor for actor in self.actors if actor.is_drawn and id(actor) not in together]
 
 
 def mesh_size(figure: Figure) -> float:

@@ -14,6 +14,7 @@ from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.lineup import has_joint_marks, placement_of, shows_mesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, joint_marks_of
 from viewer.rendering.passes.instance_pass import InstanceBuffers, draw_instance_shapes
@@ -21,16 +22,7 @@ from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_pr
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.view import View, in_front, set_model
-from viewer.rendering.visibility import (
-    has_joint_marks,
-    placement_of,
-    shows_mesh,
-    update_meshes,
-    update_skeletons,
-    with_markers,
-    with_points,
-    with_skeleton,
-)
+from viewer.rendering.visibility import update_meshes, update_skeletons
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.scene import Actor, Scene
@@ -95,20 +87,21 @@ class PickPass:
         self._begin()
         near = replace(view, projection=_window(size, pixel) @ view.projection)
         self._found, self._is_small = [], []
-        meshes = update_meshes(self._buffers, scene.actors, options)
+        lineup = self._buffers.line_up(scene.actors, options)
+        meshes = update_meshes(self._buffers, lineup, options)
         numbers = {id(actor): number for number, actor in enumerate(scene.actors)}
         for actor, mesh in meshes.singles:
             self._draw_mesh(numbers[id(actor)], mesh, placement_of(actor, options), near, options)
-        for actors, instances in meshes.instanced:
-            whose_numbers = [numbers[id(actor)] for actor in actors]
+        for group, instances in meshes.instanced:
+            whose_numbers = [numbers[id(actor)] for actor in group.actors]
             self._draw_instances(whose_numbers, instances, near, options)
-        update_skeletons(self._buffers, scene.actors, options)
+        update_skeletons(self._buffers, lineup, options)
         for which, draw in (
-            (with_skeleton, self._draw_skeleton),
-            (with_points, self._draw_points),
-            (with_markers, self._draw_markers),
+            (lineup.skeletons, self._draw_skeleton),
+            (lineup.points, self._draw_points),
+            (lineup.markers, self._draw_markers),
         ):
-            for actor in which(scene.actors, options):
+            for actor in which:
                 draw(numbers[id(actor)], actor, near, options)
         return self._read(near)
 

@@ -21,6 +21,7 @@ from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
+from viewer.rendering.lineup import Lineup, has_joint_marks, placement_of, shows_mesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.background_pass import BackgroundPass, is_light
 from viewer.rendering.passes.ground_pass import GroundPass
@@ -34,15 +35,9 @@ from viewer.rendering.view import View, view_of
 from viewer.rendering.visibility import (
     Meshes,
     far_first,
-    has_joint_marks,
-    placement_of,
     prepare_meshes,
-    shows_mesh,
     update_meshes,
     update_skeletons,
-    with_markers,
-    with_points,
-    with_skeleton,
 )
 from viewer.rigs.arrays import Floats
 from viewer.rigs.scene import Actor, Scene
@@ -107,9 +102,10 @@ class Renderer:
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
         view = view_of(camera, target.size, depth_bounds(scene, camera.fixed, options, box))
-        meshes = self._update(scene, view, options, selected)
+        lineup = self.buffers.line_up(scene.actors, options)
+        meshes = self._update(scene, lineup, view, options, selected)
         parts = self.programs, self.mesh_pass, self.late, self.buffers
-        casters = Casters(*parts, meshes, scene.actors, options)
+        casters = Casters(*parts, meshes, lineup, options)
         self.lighting.begin(casters, camera.up, box)
         count = n_passes(options)
         for index in range(count) if passes is None else passes:
@@ -118,7 +114,7 @@ class Renderer:
             lit = self.lighting.light(casters, shifted, target.size, one, strength)
             self._set_state(target)
             self.background_pass.draw(target, options.background)
-            self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
+            self._draw_layers(scene, lineup, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
         self._draw_overlays(scene, view, options, target.size, box, selected)
@@ -139,6 +135,7 @@ class Renderer:
     def _draw_layers(
         self,
         scene: Scene,
+        lineup: Lineup,
         meshes: Meshes,
         view: View,
         options: DisplayOptions,
@@ -159,10 +156,7 @@ class Renderer:
         draw_image_planes(self.late, scene, view, options, box)
         index = selected[0]
         chosen = scene.actors[index] if 0 <= index < len(scene.actors) else None
-        skeletons = [
-            (actor, selected[1] if actor is chosen else -1)
-            for actor in with_skeleton(scene.actors, options)
-        ]
+        skeletons = [(actor, selected[1] if actor is chosen else -1) for actor in lineup.skeletons]
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, 1.0)
@@ -174,7 +168,7 @@ class Renderer:
         if any(mesh.is_blended for mesh in meshes.uploaded):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
-        for actor in with_points(scene.actors, options):
+        for actor in lineup.points:
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self.late.draw_motion_paths(scene, view, options, target.size)
@@ -182,7 +176,7 @@ class Renderer:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
                 self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
-        for actor in with_markers(scene.actors, options):
+        for actor in lineup.markers:
             markers = self.buffers.keypoints_of(actor)
             markers.update(actor.require_pose(), options.skinning)
             # Marker positions already include the placement of the pose.
@@ -264,24 +258,32 @@ class Renderer:
         """Upload a scene's buffers in advance, so that a failure leaves the previous scene."""
         # Whatever was uploaded before a failure is freed.
         with self.buffers.guard():
-            prepare_meshes(self.buffers, scene.actors, DisplayOptions())
+            options = DisplayOptions()
+            prepare_meshes(self.buffers, self.buffers.line_up(scene.actors, options), options)
             for actor in scene.actors:
+                if actor.figure.mesh is not None:
+                    self.buffers.mesh(actor.figure)
                 if actor.figure.skeleton is not None:
                     self.buffers.skeleton(actor)
 
     def _update(
-        self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]
+        self,
+        scene: Scene,
+        lineup: Lineup,
+        view: View,
+        options: DisplayOptions,
+        selected: tuple[int, int],
     ) -> Meshes:
         """Skin changed meshes, and upload other changed data."""
-        meshes = update_meshes(self.buffers, scene.actors, options)
+        meshes = update_meshes(self.buffers, lineup, options)
         if options.shading == "scalar" and meshes.singles:
             index, joint = selected
             whose = scene.actors[index] if 0 <= index < len(scene.actors) else None
             figures = [actor.figure for actor in scene.actors if actor.figure.mesh is not None]
             values = [(actor, mesh.scalars) for actor, mesh in meshes.singles]
             self.scalars.update(values, options, (whose, joint), figures)
-        update_skeletons(self.buffers, scene.actors, options)
-        for actor in with_points(scene.actors, options):
+        update_skeletons(self.buffers, lineup, options)
+        for actor in lineup.points:
             points = self.buffers.points_of(actor)
             points.update(actor, actor.placement, view, options)
         return meshes

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.transform import affine_matrices
+from viewer.rigs.hierarchy import depth_first
 from viewer.rigs.memo import Memo
 from viewer.rigs.pose import Pose, PosedSkeleton, joint_rotations, local_transforms, zero_pose
 from viewer.rigs.skeleton import Skeleton
@@ -57,7 +58,10 @@ def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
     world = np.empty((shape[1], 4, 4, shape[0]))
     local = np.empty(world.shape[1:])  # of one joint: the processor's cache keeps it
     world[:, :, 3] = local[:, 3] = [[0.0], [0.0], [0.0], [1.0]]
-    for joint, parent in enumerate(parents.tolist()):
+    # Nodes of files may be listed before their parents.
+    is_sorted = (parents < np.arange(len(parents))).all()
+    for joint in range(len(parents)) if is_sorted else depth_first(parents).tolist():
+        parent = parents[joint]
         local[:3, :3], local[3, :3] = linear[joint], offsets[joint]
         if parent < 0:
             world[joint] = local

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _orders: Memo[Skeleton, _AxisProducts] = Memo()
 _Indices = NDArray[np.intp]
+_IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(slots=True, eq=False)
@@ -191,7 +192,12 @@ def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
 
 def local_rotations(skeleton: Skeleton, quaternions: Floats, dofs: Floats) -> Floats:
     """Return R(quaternion) R(DOFs) (..., J, 3, 3) of quaternions (..., J, 4) and DOFs (..., D)."""
+    # Most files use either quaternions or DOFs; the others are identities, which need no product.
+    if (quaternions == _IDENTITY).all():
+        return dof_rotations(skeleton, dofs)
     beneath = quaternion_entries(*batch_last(quaternions, 2).swapaxes(0, 1))
+    if skeleton.posing is None and not dofs[..., skeleton.dof_kinds >= FIRST_ROTATION].any():
+        return np.moveaxis(beneath, (0, 1, 2), (-2, -1, -3))
     turns = np.moveaxis(dof_rotations(skeleton, dofs), (-2, -1, -3), (0, 1, 2))
     return np.moveaxis(np.einsum("ik...,kj...->ij...", beneath, turns), (0, 1, 2), (-2, -1, -3))
 

@@ -6,21 +6,30 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 import pytest
-from rendering.drawn_figures import arm, bent, checker, random_figure, random_pose
+from rendering.drawn_figures import (
+    arm,
+    bent,
+    checker,
+    group_of,
+    groups_of,
+    random_figure,
+    random_pose,
+)
 
 import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
+from viewer.rendering import lineup
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu import actor_buffers, context, posed_vertices
 from viewer.rendering.gpu.corrective_sums import WAYS, Way
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.lineup import FEWEST, Group
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass
-from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.view import View, view_of
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure, figure_pose
@@ -42,13 +51,15 @@ class Instances:
         if figure.correctives is not None:
             self.mesh.corrective_sums.way = way
         self.instances = InstanceBuffers(ctx, self.programs, self.mesh)
+        self.group: Group | None = None
 
     def vertices(self, actors, how: Skinning, eye=(0.0, 0.0, 0.0)):
         """Return the output of the drawing pass's vertex shader, relative to the eye."""
         matrix = np.eye(4)
         matrix[:3, 3] = -np.asarray(eye)
         self.instances.vertices.reserve(len(actors))
-        self.instances.update(actors, how)
+        self.group = group_of(actors, self.group)
+        self.instances.update(self.group, how)
         program = self.programs.feedback("mesh", "", VARYINGS, ("INSTANCED",))
         self.instances.use(program, View(matrix, np.eye(4), Camera()))
         count = self.mesh.n_vertices
@@ -218,10 +229,10 @@ def test_instances_look_like_their_actors_drawn_one_by_one(offscreen, monkeypatc
     scene = rows_of_arms(FEWEST)
     options = DisplayOptions(**changes)
     camera, box = default_camera(scene, (200, 150)), scene_box(scene)
-    assert len(instance_groups(scene.actors, options)) == 1
+    assert len(groups_of(scene.actors, options)) == 1
     together = offscreen.render(scene, (200, 150), camera, options, box)
-    monkeypatch.setattr(instance_pass, "FEWEST", 100)
-    assert instance_groups(scene.actors, options) == []
+    monkeypatch.setattr(lineup, "FEWEST", 100)
+    assert groups_of(scene.actors, options) == []
     alone = offscreen.render(scene, (200, 150), camera, options, box)
     difference = np.abs(together.astype(int) - alone).max(axis=-1)
     assert (difference > 2).mean() < 0.001
@@ -233,22 +244,22 @@ def test_only_actors_of_one_figure_and_shape_are_drawn_together():
     actors = [Actor(body) for _ in range(2 * FEWEST)] + [Actor(fox) for _ in range(FEWEST - 1)]
     for actor in actors[:FEWEST]:
         actor.pose.shape_weights[0] = 1.0
-    groups = instance_groups(actors, DisplayOptions())
+    groups = groups_of(actors, DisplayOptions())
     assert groups == [actors[:FEWEST], actors[FEWEST : 2 * FEWEST]]
     actors[0].pose.shape_weights[0] = 2.0
-    assert instance_groups(actors, DisplayOptions()) == [actors[FEWEST : 2 * FEWEST]]
+    assert groups_of(actors, DisplayOptions()) == [actors[FEWEST : 2 * FEWEST]]
 
 
 @pytest.mark.parametrize(
     "changes", [{"wireframe": True}, {"normals": True}, {"shading": "scalar"}, {"show": "binding"}]
 )
 def test_views_of_single_vertices_draw_actors_one_by_one(changes):
-    assert instance_groups(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
+    assert groups_of(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
 
 
 def test_meshes_without_a_skin_are_not_instanced():
     figure = replace(arm(3), skin=None)
-    assert instance_groups([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
+    assert groups_of([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
 
 
 def test_absent_and_hidden_actors_are_not_drawn(offscreen):
@@ -285,7 +296,7 @@ def test_refused_upload_is_tried_again(ctx, monkeypatch):
     with monkeypatch.context() as patch, pytest.raises(RenderError):
         patch.setattr(posed_vertices, "write_stacked", refuse)
         instances.instances.vertices.reserve(len(actors))
-        instances.instances.update(actors, Skinning())
+        instances.instances.update(group_of(actors), Skinning())
     check(instances, actors, Skinning())
     instances.release()
 
@@ -404,8 +415,9 @@ def test_groups_that_exceed_a_storage_buffer_are_split(offscreen, monkeypatch):
     limit = 10 * BYTES_PER_VERTEX * mesh.n_vertices
     limits = {**offscreen.context.info, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE": limit + 1}
     monkeypatch.setattr(moderngl.Context, "info", property(lambda self: limits))
-    groups = offscreen.renderer.buffers.groups(scene.actors, options)
-    assert [len(group) for group in groups] == [10, 10, 10, 10]
+    buffers = offscreen.renderer.buffers
+    groups = buffers.groups(buffers.line_up(scene.actors, options), options)
+    assert [len(group.rows) for group in groups] == [10, 10, 10, 10]
     split = offscreen.render(scene, (64, 48), camera, options, box)
     np.testing.assert_array_equal(split, whole)
 
@@ -415,7 +427,8 @@ def test_drivers_without_storage_buffers_draw_actors_one_by_one(offscreen, monke
     camera, box = default_camera(scene, size), scene_box(scene)
     together = offscreen.render(scene, size, camera, DisplayOptions(), box)
     monkeypatch.setattr(context, "STORAGE_VERSION", 10_000)
-    assert offscreen.renderer.buffers.groups(scene.actors, DisplayOptions()) == []
+    buffers, options = offscreen.renderer.buffers, DisplayOptions()
+    assert buffers.groups(buffers.line_up(scene.actors, options), options) == []
     alone = offscreen.render(scene, size, camera, DisplayOptions(), box)
     assert (np.abs(together.astype(int) - alone).max(axis=-1) > 2).mean() < 0.001
 
@@ -488,7 +501,7 @@ def test_back_faces_of_closed_crowds_are_hidden_also_when_joints_scale(ctx):
 
     def hides_backs() -> bool:
         instances.instances.vertices.reserve(len(actors))
-        instances.instances.update(actors, Skinning())
+        instances.instances.update(group_of(actors), Skinning())
         return instances.instances.hides_backs(view, Skinning())
 
     assert hides_backs()

@@ -8,7 +8,7 @@ from formats.mhr.mhr_files import write as write_mhr
 from formats.skel_body.skel_files import arrays as skel
 from formats.smpl.quaternion_files import star, supr
 from numpy.testing import assert_allclose
-from rendering.drawn_figures import random_pose, skeleton, sphere
+from rendering.drawn_figures import group_of, random_pose, skeleton, sphere
 from rendering.front_view import alone, drawn, front_view, grid_figure
 
 import viewer
@@ -122,7 +122,7 @@ def test_buffers_distinguish_scaled_instances_from_rigid_ones(ctx, how):
     programs, buffers = Programs(ctx), MeshBuffers(ctx, figure, [])
     instances = InstanceBuffers(ctx, programs, buffers)
     instances.vertices.reserve(len(actors))
-    instances.update(actors, how)
+    instances.update(group_of(actors), how)
     program = programs.feedback("mesh", "", ("v_normal",), ("INSTANCED",))
     instances.use(program, View(np.eye(4), np.eye(4), Camera()))
     count = buffers.n_vertices

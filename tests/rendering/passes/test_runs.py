@@ -17,11 +17,11 @@ from rendering.front_view import (
 )
 from rendering.plain_pictures import N, draw, front, lights, plain
 
+from viewer.rendering import lineup
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu import mesh_buffers
 from viewer.rendering.gpu.target import Target, picture_rows
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rigs.figure import Figure
 from viewer.rigs.material import Material, Texture
@@ -35,7 +35,7 @@ GROUND = np.array([[-2.0, -1.5, -2.0], [2.0, 1.5, 2.0]])  # at height -1.5
 
 @pytest.fixture(params=[1, 100], ids=["instanced", "single"])
 def fewest(request, monkeypatch):
-    monkeypatch.setattr(instance_pass, "FEWEST", request.param)
+    monkeypatch.setattr(lineup, "FEWEST", request.param)
 
 
 def painted(mode="opaque", left=255, right=255, **changes) -> Figure:
@@ -208,7 +208,7 @@ def test_single_sides_remain_outside_under_reflections(offscreen, reflection, is
 
 
 def test_mirrored_and_plain_actors_of_one_figure_are_drawn_together(offscreen, monkeypatch):
-    monkeypatch.setattr(instance_pass, "FEWEST", 2)
+    monkeypatch.setattr(lineup, "FEWEST", 2)
     figure = painted(double_sided=False)
     actors = [Actor(figure, rest_pose(figure.skeleton)) for _ in range(4)]
     for number, actor in enumerate(actors):

@@ -10,8 +10,8 @@ from formats.synthetic_smpl import joint_parents, model
 from formats.video_mocap.tool_files import matrices, scene_of, vertices, wham, wham_file
 from numpy.testing import assert_allclose, assert_array_equal
 from rendering.moving import MISSING, RATE, SPEED, moving_arm
-from rig.animated import about, channel, clip_of
-from rig.hand_made import skeleton
+from rigs.animated import about, channel, clip_of
+from rigs.hand_made import skeleton
 
 import viewer
 from viewer.errors import RigError

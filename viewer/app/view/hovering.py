@@ -11,8 +11,8 @@ from viewer.app.posing.toolbar import no_tool
 from viewer.app.view.axis_gizmo import is_over_gizmo
 from viewer.app.weights.weights_panel import Weights, wants_vertex
 from viewer.data_classes import dataclass
+from viewer.rendering.lineup import has_joint_marks, shows_skeleton
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.visibility import has_joint_marks, shows_skeleton
 from viewer.rigs.skeleton import joint_label
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked

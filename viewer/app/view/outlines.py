@@ -10,9 +10,9 @@ from viewer.app.weights.weights_panel import Weights
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.gpu.target import Target
+from viewer.rendering.lineup import shows_skeleton
 from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.visibility import shows_skeleton
 from viewer.rigs.geometry.transform import apply_transform
 
 

@@ -14,8 +14,9 @@ from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.posed_vertices import BYTES_PER_VERTEX, SharedVertices
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.lineup import Group, Lineup, is_culled, lineup
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
 from viewer.rigs.figure import Figure
 from viewer.rigs.scene import Actor
@@ -56,6 +57,7 @@ class ActorBuffers:
         self.context, self.programs, self._cube, self._notes = context, programs, cube, notes
         self._forget = forget
         self.meshes: Kept[Figure, MeshBuffers] = Kept()
+        self._lineup = Lineup()
         self._state: tuple[Sequence[Actor], list[Figure], int] = [], [], 0
         self._shared = SharedVertices(context)
         self._instanced: Kept[Figure, _InstancedShapes] = Kept()
@@ -116,17 +118,18 @@ class ActorBuffers:
             kept.append(InstanceBuffers(self.context, self.programs, self.mesh(figure)))
         return kept
 
-    def groups(self, actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
-        """Return the actors that are drawn together, as many as a storage buffer has room for."""
-        limit = min(storage_limit(self.context), MOST_POSED // 4)
-        if not limit:
-            return []
-        found: list[list[Actor]] = []
-        for group in instance_groups(actors, options):
-            size = BYTES_PER_VERTEX * self.mesh(group[0].figure).n_vertices
-            most = limit // size
-            if most >= FEWEST:
-                found += (group[start : start + most] for start in range(0, len(group), most))
+    def line_up(self, actors: Sequence[Actor], options: DisplayOptions) -> Lineup:
+        """Return the drawn actors of a scene, with crowds that are up to date."""
+        self._lineup = lineup(actors, options, self._lineup)
+        return self._lineup
+
+    def groups(self, drawn: Lineup, options: DisplayOptions) -> list[Group]:
+        """Return the groups of crowds, of as many actors as a storage buffer has room for."""
+        limit, found = min(storage_limit(self.context), MOST_POSED // 4), list[Group]()
+        for crowd in drawn.crowds.values():
+            figure = crowd.actors[0].figure
+            most = limit // (BYTES_PER_VERTEX * self.mesh(figure).n_vertices)
+            found += crowd.groups(is_culled(figure, options), most)
         return found
 
     def shared_after(self, size: int) -> SharedVertices | None:

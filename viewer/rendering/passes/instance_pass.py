@@ -12,7 +12,6 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.data_classes import dataclass
 from viewer.rendering.gpu.back_faces import are_before, have_one_side, is_together
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
@@ -27,6 +26,7 @@ from viewer.rendering.joint_spheres import (
     skin_spheres,
     stretch_bounds,
 )
+from viewer.rendering.lineup import Group, Rows
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
@@ -40,14 +40,10 @@ from viewer.rendering.view import View, set_lights
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import palette_sizes, skinning_matrices
-from viewer.rigs.motion.instances import PoseTable, placements, worlds
+from viewer.rigs.motion.instances import worlds
 from viewer.rigs.pose import Pose, local_rotations
-from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights, shaped
 from viewer.rigs.skinning import Skinning
-
-FEWEST = 8
-"""Minimum number of actors to draw as instances; see ``instance_groups``."""
 
 _PER_INSTANCE = {
     "in_model_x": 3,
@@ -59,82 +55,6 @@ _PER_INSTANCE = {
 }
 _FLOATS = sum(_PER_INSTANCE.values())
 _LAYOUT = " ".join(f"{count}f4" for count in _PER_INSTANCE.values())
-
-
-def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
-    """Return groups, of at least ``FEWEST`` actors of one figure and shape, drawn as instances."""
-    # Translucent actors, actors with hidden parts, outlines or changed materials are drawn one by
-    # one, and so is everything in views that draw lines or values of single vertices.
-    if options.show == "binding" or options.shading == "scalar":
-        return []
-    if options.wireframe or options.normals:
-        return []
-    kinds: dict[int, _Kind] = {}
-    groups: dict[tuple[int, bytes], list[Actor]] = {}
-    for actor in actors:
-        pose, figure = actor.pose, actor.figure
-        if pose is None or actor.hidden_parts or options.opacity * actor.opacity != 1.0:
-            continue
-        kind = kinds.get(id(figure))
-        if kind is None:
-            kind = kinds[id(figure)] = _kind_of(figure)
-        if not kind.is_plain or (kind.has_binds and pose.shape_weights.any()):
-            continue
-        groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
-    found = [
-        side
-        for (figure, _), group in groups.items()
-        if len(group) >= FEWEST
-        for side in _by_side(group, options.cull or kinds[figure].is_culled)
-    ]
-    return [group for group in found if len(group) >= FEWEST]
-
-
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    """What decides whether actors of a figure are drawn as instances."""
-
-    is_plain: bool
-    """Whether the figure is skinned, and no material has an outline."""
-    has_binds: bool
-    """Whether expressions may change materials."""
-    is_culled: bool
-    """Whether back faces of a material are not drawn."""
-
-
-def _kind_of(figure: Figure) -> _Kind:
-    shapes, materials = figure.blend_shapes, figure.require_mesh().materials
-    has_outline = any(material.outline is not None for material in materials)
-    return _Kind(
-        figure.is_attached and not has_outline,
-        shapes is not None and shapes.material_binds is not None,
-        not all(material.double_sided for material in materials),
-    )
-
-
-def _by_side(group: list[Actor], is_culled: bool) -> list[list[Actor]]:
-    """Split actors whose placements reflect from the others: their triangles are clockwise."""
-    poses = [actor.require_pose() for actor in group]
-    if is_culled:
-        # Joints that reflect turn only a part of the triangles: such actors are drawn alone.
-        scales = np.concatenate([pose.scales for pose in poses]).reshape(len(group), -1)
-        if (scales < 0.0).any():
-            reflects = (scales < 0.0).any(axis=1)
-            group = [group[row] for row in np.flatnonzero(~reflects).tolist()]
-            poses = [actor.require_pose() for actor in group]
-            if not group:
-                return []
-    linear = _stacked(group)[:, :3, :3]
-    signs = np.linalg.det(linear) * np.array([pose.figure_scale for pose in poses]) < 0.0
-    if not signs.any():
-        return [group]
-    sides = (np.flatnonzero(signs == side).tolist() for side in (False, True))
-    return [[group[row] for row in side] for side in sides]
-
-
-def _stacked(actors: Sequence[Actor]) -> Floats:
-    """Return the actors' placements: (A, 4, 4)."""
-    return np.concatenate([actor.placement for actor in actors]).reshape(-1, 4, 4)
 
 
 def draw_instances(
@@ -192,40 +112,40 @@ class InstanceBuffers:
         self.count = self.n_updates = 0
         self.is_mirrored = False
         self.vertices = PosedVertices(context, programs, mesh)
-        self._table = PoseTable()
-        self._key: tuple[object, ...] = ()
-        self._poses: Sequence[Pose] = ()
+        self._state: tuple[object, ...] = ()
+        self._versions: NDArray[np.int64] = np.zeros(0, np.int64)  # of the skinned poses
+        self._group: Group
         self._how = Skinning()
         self._figure = mesh.figure
         self._spheres: Floats = np.zeros((0, 0, 4))
         self._has_one_side: Bools = np.zeros(0, dtype=np.bool_)
         self._models: Floats = np.zeros((0, 4, 4))
-        self._placed: tuple[object, ...] = ()
         self._bounds: Bounds | None = None
         self._instances: moderngl.Buffer | None = None
         self._arrays = VertexArrays(context)
 
-    def update(self, actors: Sequence[Actor], how: Skinning) -> None:
+    def update(self, group: Group, how: Skinning) -> None:
         """Skin the actors whose pose changed, and upload placements that changed."""
-        poses = [actor.require_pose() for actor in actors]
-        changed = self._table.update(poses)
-        key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
-        self.count, self._poses, self._how = len(poses), poses, how
-        if key != self._key:
-            changed[:] = True
+        crowd, options = group.crowd, skinning_options_key(how)
+        state = group, options, crowd.version, crowd.placement_version
+        if state == self._state:
+            return
+        versions = crowd.versions[group.rows]
+        changed = np.ones(len(versions), dtype=np.bool_)
+        if self._state[:2] == (group, options):
+            changed = versions != self._versions
+        self._state = ()  # after an error, all actors are skinned again
+        self.count, self._group, self._how = len(versions), group, how
         if changed.any():
-            self._key = ()  # after an error, all actors are skinned again
             self._skin(np.flatnonzero(changed | self.vertices.are_lost))
             self.n_updates += 1
-            self._key = key
-        self._place(actors, poses)
+        self._place()
+        self._versions, self._state = versions, state
 
-    def _skin(self, rows: NDArray[np.intp]) -> None:
-        poses, how = self._poses, self._how
-        assert self._table.arrays is not None  # just updated
-        figure = shaped(self.mesh.figure, poses[0].shape_weights)
+    def _skin(self, rows: Rows) -> None:
+        crowd, how, chosen = self._group.crowd, self._how, self._group.rows[rows]
+        arrays, figure = crowd.arrays.rows(chosen), shaped(self.mesh.figure, crowd.shape_weights)
         skeleton, skin = figure.require_skeleton(), figure.require_skin()
-        arrays = self._table.arrays.rows(rows)
         rotations = local_rotations(skeleton, arrays.rotations, arrays.dofs)
         matrices = skinning_matrices(worlds(skeleton, arrays, rotations), skin.inverse_bind)
         sizes = palette_sizes(skin, arrays.scales, matrices)
@@ -236,26 +156,23 @@ class InstanceBuffers:
         self._spheres[rows] = spheres
         weights = None
         if figure.correctives is not None and how.correctives:
-            chosen = [poses[row] for row in rows.tolist()]
-            weights = _pose_weights(figure, chosen, rotations)
+            poses = [crowd.poses[row] for row in chosen.tolist()]
+            weights = _pose_weights(figure, poses, rotations)
         rigid = self.vertices.skin(rows, figure, how, matrices, weights, sizes)
         self._has_one_side[rows] = rigid | have_one_side(matrices) if not rigid.all() else True
         self._figure = figure
 
-    def _place(self, actors: Sequence[Actor], poses: Sequence[Pose]) -> None:
-        """Upload the actors' placements and colours if any changed, or the posed centres did."""
-        models = _stacked(actors) @ placements(poses)
-        colors = np.array([actor.color or SKIN_COLOR for actor in actors])
-        state = models.tobytes(), colors.tobytes(), self.n_updates
-        if state == self._placed:
-            return
-        self._placed = ()
+    def _place(self) -> None:
+        """Upload the actors' placements, which include the posed centres, and their colours."""
+        crowd, rows = self._group.crowd, self._group.rows
+        models = crowd.models[rows]
+        colors = np.array([crowd.colors[row] or SKIN_COLOR for row in rows.tolist()])
         linear = models[:, :3, :3]
         self.is_mirrored = bool(np.linalg.det(linear[0]) < 0.0)
         centers = self.vertices.centers[: self.count]
         places = models[:, :3, 3] + (linear @ centers[..., None])[..., 0]
-        rows = [linear.reshape(-1, 9), *_two_floats(places), colors]
-        data = float32(np.concatenate(rows, axis=1))
+        parts = [linear.reshape(-1, 9), *_two_floats(places), colors]
+        data = float32(np.concatenate(parts, axis=1))
         if self._instances is None or self._instances.size < data.nbytes:
             self._arrays.release()
             if self._instances is not None:
@@ -263,7 +180,7 @@ class InstanceBuffers:
             self._instances = None
             self._instances = reserved(self.context, 3 * data.nbytes // 2, "instances")
         self._instances.write(data)
-        self._models, self._bounds, self._placed = models, None, state
+        self._models, self._bounds = models, None
 
     def bounds(self) -> Bounds:
         """Return the bounds of the vertices in scene space."""

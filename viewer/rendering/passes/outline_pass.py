@@ -18,6 +18,7 @@ from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.target import Target
+from viewer.rendering.lineup import has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle, dots
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
@@ -25,7 +26,6 @@ from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.view import View
-from viewer.rendering.visibility import has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rigs.arrays import Floats
 from viewer.rigs.scene import Actor, Scene
 

@@ -32,10 +32,11 @@ class PoseArrays(NamedTuple):
     """(A, J, 3)."""
 
     def rows(self, rows: NDArray[np.intp]) -> PoseArrays:
-        """Return the values of some of the poses."""
-        if len(rows) == len(self.dofs):
-            return self
-        return PoseArrays(*(part[rows] for part in self))
+        """Return the values of some of the poses, ascending."""
+        # Of consecutive rows, nothing is copied.
+        is_range = len(rows) and rows[-1] - rows[0] + 1 == len(rows)
+        which = slice(rows[0], rows[-1] + 1) if is_range else rows
+        return PoseArrays(*(part[which] for part in self))
 
 
 def pose_arrays(poses: Sequence[Pose], into: PoseArrays | None = None) -> PoseArrays:
@@ -65,20 +66,21 @@ class PoseTable:
         self.arrays: PoseArrays | None = None
         self._spare: PoseArrays | None = None  # memory of the values before
 
-    def update(self, poses: Sequence[Pose]) -> Bools:
-        """Gather the values of poses into ``arrays``; return which differ from before, (A,)."""
+    def update(self, poses: Sequence[Pose]) -> Bools | None:
+        """Gather the values of poses into ``arrays``; return which changed, (A,), if any did."""
         new, old = pose_arrays(poses, self._spare), self.arrays
+        changed: Bools | None = None
         if old is None or any(a.shape != b.shape for a, b in zip(new, old, strict=True)):
             changed = np.ones(len(poses), dtype=np.bool_)
         else:
-            changed = np.zeros(len(poses), dtype=np.bool_)
             for part, before in zip(new, old, strict=True):
                 # Bits, as -0 is another value, and a value that is not a number equals itself.
                 bits, known = (
                     each.reshape(len(poses), -1).view(np.int64) for each in (part, before)
                 )
                 if not np.array_equal(bits, known):
-                    changed |= (bits != known).any(axis=1)
+                    differ = (bits != known).any(axis=1)
+                    changed = differ if changed is None else changed | differ
         self.arrays, self._spare = new, old
         return changed
 

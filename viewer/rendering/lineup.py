@@ -1,0 +1,302 @@
+"""Which actors of a scene are drawn, and which of them together: crowds of one figure and shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.rendering.options import Color, DisplayOptions
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.motion.instances import PoseArrays, PoseTable, placements
+from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.scene import Actor
+
+FEWEST = 8
+"""Minimum number of actors to draw as instances."""
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Actors of a crowd that are drawn together: their placements all reflect, or none does."""
+
+    crowd: Crowd
+    rows: Rows
+    """Ascending."""
+    actors: list[Actor]
+    """The same actors."""
+
+
+class Crowd:
+    """Skinned actors of one figure and shape as arrays, and a version of each actor's pose."""
+
+    # Poses and placements are arrays that anyone may change in place, so ``update`` gathers and
+    # compares their numbers. All that follows from them is computed if a version has grown.
+
+    def __init__(self, actors: list[Actor]) -> None:
+        self.actors = actors
+        self.shape_weights: Floats = actors[0].require_pose().shape_weights.copy()
+        self.poses: list[Pose] = []
+        """The poses of the actors, set again when an actor gets another one."""
+        self.versions: NDArray[np.int64] = np.zeros(len(actors), np.int64)
+        self.version = self.placement_version = self._side_version = 0
+        self.models: Floats = np.zeros((0, 4, 4))
+        self.colors: list[Color | None] = []
+        self._table = PoseTable()
+        self._placed: tuple[Floats, Floats, list[float]] = np.zeros(0), np.zeros(0), []
+        self._reflected: Bools = np.zeros(0, dtype=np.bool_)
+        self._key: tuple[object, ...] = ()
+        self._groups: list[Group] = []
+
+    @property
+    def arrays(self) -> PoseArrays:
+        """The values of all poses at the last update."""
+        assert self._table.arrays is not None  # just updated
+        return self._table.arrays
+
+    def update(self) -> None:
+        """Gather the values of all actors, and raise the versions of what changed."""
+        changed = self._table.update(self.poses)
+        if changed is not None:
+            self.version += 1
+            self.versions[changed] = self.version
+        self._place(self.poses)
+
+    def _place(self, poses: list[Pose]) -> None:
+        places = np.concatenate([actor.placement for actor in self.actors])
+        shifts = np.concatenate([pose.figure_translation for pose in poses])
+        scales = [pose.figure_scale for pose in poses]
+        colors = [actor.color for actor in self.actors]
+        old = self._placed
+        is_turned = scales != old[2] or not np.array_equal(places, old[0])
+        if not is_turned and colors == self.colors and np.array_equal(shifts, old[1]):
+            return
+        self.models, self.colors = places.reshape(-1, 4, 4) @ placements(poses), colors
+        if is_turned:
+            reflected = np.linalg.det(self.models[:, :3, :3]) < 0.0
+            self._side_version += not np.array_equal(reflected, self._reflected)
+            self._reflected = reflected
+        self._placed = places, shifts, scales
+        self.placement_version += 1
+
+    def groups(self, is_culled: bool, most: int) -> list[Group]:
+        """Return the groups of at most so many actors, the same objects until they change.
+
+        ``is_culled``: whether back faces of a material are not drawn.
+        """
+        key = FEWEST, most, is_culled, self._side_version, is_culled and self.version
+        if key != self._key:
+            # Triangles of actors that are reflected are clockwise seen from their front.
+            sides = [np.flatnonzero(self._reflected == side) for side in (False, True)]
+            if is_culled:
+                # Joints that reflect turn only a part of the triangles: such actors are drawn
+                # alone.
+                plain = np.asarray((self.arrays.scales >= 0.0).all(axis=(1, 2)))
+                sides = [rows[plain[rows]] for rows in sides]
+            found = [
+                rows[start : start + most]
+                for rows in sides
+                if len(rows) >= FEWEST and most >= FEWEST
+                for start in range(0, len(rows), most)
+            ]
+            known = [group.rows for group in self._groups]
+            if len(found) != len(known) or not all(map(np.array_equal, found, known)):
+                actors = self.actors
+                self._groups = [
+                    Group(self, rows, [actors[row] for row in rows.tolist()]) for rows in found
+                ]
+            self._key = key
+        return self._groups
+
+
+@dataclass(slots=True, eq=False)
+class Lineup:
+    """The drawn actors of a scene, by what is drawn of each."""
+
+    key: tuple[object, ...] = ()
+    """All that decides about the other fields; see ``lineup``."""
+    crowds: dict[tuple[int, bytes], Crowd] = field(default_factory=dict)
+    """Actors whose meshes may be drawn together, by figure and shape."""
+    drawn: list[Actor] = field(default_factory=list)
+    """All drawn actors."""
+    skeletons: list[Actor] = field(default_factory=list)
+    """Drawn actors whose joints are drawn."""
+    points: list[Actor] = field(default_factory=list)
+    """Drawn actors whose captured points are drawn."""
+    markers: list[Actor] = field(default_factory=list)
+    """Drawn actors whose keypoints are drawn."""
+    groups: list[Group] = field(default_factory=list)
+    """Groups of the crowds, set by ``divide``."""
+    alone: list[Actor] = field(default_factory=list)
+    """Drawn actors that are in no group."""
+    beside: list[Actor] = field(default_factory=list)
+    """Actors of groups of which more than the mesh is drawn."""
+
+    def divide(self, groups: list[Group]) -> None:
+        """Divide the drawn actors into groups and those that are drawn one by one."""
+        if self.groups == groups and (groups or len(self.alone) == len(self.drawn)):
+            return
+        together = {id(actor) for group in groups for actor in group.actors}
+        more = {id(actor) for actor in self.skeletons}
+        self.groups = groups
+        self.alone = [actor for actor in self.drawn if id(actor) not in together]
+        self.beside = [
+            actor
+            for group in groups
+            for actor in group.actors
+            if id(actor) in more or actor.points is not None
+        ]
+
+
+def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> Lineup:
+    """Return the drawn actors, the same object as ``before`` if nothing about them changed.
+
+    The crowds are up to date.
+    """
+    # What an actor draws, but for the numbers of poses and placements. Tuples of the same objects
+    # are compared quickly.
+    states = [
+        (
+            actor.figure,
+            actor.pose,
+            actor.visible,
+            actor.is_present,
+            actor.opacity,
+            actor.hidden_parts,
+            actor.points is None,
+        )
+        for actor in actors
+    ]
+    shapes = [b"" if a.pose is None else a.pose.shape_weights.tobytes() for a in actors]
+    views = options.show, options.shading == "scalar", options.wireframe, options.normals
+    shown = options.opacity, options.captured_keypoints, options.keypoints
+    key = list(actors), states, shapes, views, shown, FEWEST
+    if key != before.key:
+        drawn = [actor for actor in actors if actor.is_drawn]
+        crowds = _crowds(drawn, options, before.crowds)
+        before = Lineup(
+            key,
+            crowds,
+            drawn,
+            with_skeleton(drawn, options),
+            with_points(drawn, options),
+            with_markers(drawn, options),
+        )
+    for crowd in before.crowds.values():
+        crowd.update()
+    return before
+
+
+def _crowds(
+    actors: Sequence[Actor], options: DisplayOptions, before: dict[tuple[int, bytes], Crowd]
+) -> dict[tuple[int, bytes], Crowd]:
+    """Return crowds of at least ``FEWEST`` drawn actors, those of before with the same actors."""
+    # Translucent actors, actors with hidden parts, outlines or changed materials are drawn one by
+    # one, and so is everything in views that draw lines or values of single vertices.
+    if options.show in ("binding", "skeleton") or options.shading == "scalar":
+        return {}
+    if options.wireframe or options.normals:
+        return {}
+    kinds: dict[int, tuple[bool, bool]] = {}
+    groups: dict[tuple[int, bytes], list[Actor]] = {}
+    for actor in actors:
+        pose, figure = actor.pose, actor.figure
+        if pose is None or actor.hidden_parts or options.opacity * actor.opacity != 1.0:
+            continue
+        if id(figure) not in kinds:
+            kinds[id(figure)] = _kind_of(figure)
+        is_plain, has_binds = kinds[id(figure)]
+        if is_plain and not (has_binds and pose.shape_weights.any()):
+            groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
+    found = {}
+    for key, group in groups.items():
+        if len(group) >= FEWEST:
+            known = before.get(key)
+            is_known = known is not None and known.actors == group
+            crowd = found[key] = known if known is not None and is_known else Crowd(group)
+            crowd.poses = [actor.require_pose() for actor in group]
+    return found
+
+
+def _kind_of(figure: Figure) -> tuple[bool, bool]:
+    """Return whether a figure is skinned without outlines, and if expressions change materials."""
+    if figure.mesh is None or not figure.is_attached:
+        return False, False
+    shapes = figure.blend_shapes
+    has_outline = any(material.outline is not None for material in figure.mesh.materials)
+    return not has_outline, shapes is not None and shapes.material_binds is not None
+
+
+def is_culled(figure: Figure, options: DisplayOptions) -> bool:
+    """Return whether back faces of a figure's material are not drawn."""
+    materials = figure.require_mesh().materials
+    return options.cull or not all(material.double_sided for material in materials)
+
+
+def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
+    """Return whether a figure's surface is drawn."""
+    return figure.mesh is not None and (options.show != "skeleton" or figure.skeleton is None)
+
+
+def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
+    """Return whether an actor's joint boxes are drawn."""
+    return bool(with_skeleton([actor], options))
+
+
+def with_skeleton(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors whose joint boxes are drawn."""
+    # Among a thousand actors, the first condition is usually the last.
+    wanted = options.show in ("skeleton", "both")
+    return [
+        actor
+        for actor in actors
+        if (wanted or actor.figure.mesh is None)
+        and actor.is_drawn
+        and actor.figure.skeleton is not None
+    ]
+
+
+def has_points(actor: Actor, options: DisplayOptions) -> bool:
+    """Return whether an actor's captured points are drawn."""
+    return bool(with_points([actor], options))
+
+
+def with_points(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors whose captured points are drawn."""
+    if not options.captured_keypoints:
+        return []
+    return [
+        actor
+        for actor in actors
+        if actor.points is not None and actor.is_drawn and actor.figure.points is not None
+    ]
+
+
+def with_markers(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
+    """Return the actors with a figure whose keypoints are drawn."""
+    if not options.keypoints or options.show == "binding":
+        return []
+    return [
+        actor
+        for actor in actors
+        if actor.figure.keypoints is not None and actor.is_drawn and actor.pose is not None
+    ]
+
+
+def has_joint_marks(options: DisplayOptions) -> bool:
+    """Return whether joint marks are drawn in addition to boxes."""
+    wanted = options.joint_names or options.joint_axes or options.xray
+    return wanted and options.show != "binding"
+
+
+def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
+    """Return the matrix from figure to scene space: actor placement times pose placement."""
+    if actor.pose is None or options.show == "binding":
+        return actor.placement
+    return actor.placement @ placement_matrix(actor.pose)
