@@ -98,6 +98,17 @@ def test_bound_bar_follows_the_bone_inside_and_shares_at_the_joint(method):
     assert str(rigged.lines[0]) == "skeleton: used where it is, 2 of 2 joints inside the mesh"
 
 
+@pytest.mark.parametrize("method", BINDING)
+def test_binding_again_after_an_edit_gives_what_a_first_binding_gives(method):
+    mesh = joined(box([-2, -0.3, -0.3], [2, 0.3, 0.3], (16, 3, 3)))
+    ends = {"a": ("", [-1.8, 0, 0]), "b": ("a", [0, 0, 0]), "c": ("b", [1.5, 0, 0])}
+    bound(skeleton_of(ends), mesh, method)
+    moved = skeleton_of({**ends, "b": ("a", [0.7, 0.1, 0])})
+    again = weights_of(bound(moved, mesh, method))
+    first = weights_of(bound(moved, replace(mesh), method))
+    assert_allclose(again, first, atol=1e-12)
+
+
 def test_geodesic_weights_fall_off_with_the_eighth_power_of_the_distance():
     mesh = joined(BAR)
     figure = skeleton_of(CHAIN)

@@ -88,3 +88,20 @@ def test_sheet_thinner_than_a_voxel_is_kept():
 def test_flat_mesh_is_refused_where_nothing_is_enclosed():
     with pytest.raises(RigError, match="expected a mesh with an extent, found a point"):
         solid_of(np.zeros((3, 3)), np.array([[0, 1, 2]]))
+
+
+@pytest.mark.parametrize("length", [1.0, 0.01])
+def test_middle_is_halfway_through_the_first_part_that_a_ray_meets(length):
+    # Two plates, 1 and 3 thick, with a gap from x = 1 to 4, joined above by a bridge.
+    plates = box([0.0, 0, 0], [1, 4, 2]), box([4.0, 0, 0], [7, 4, 2])
+    parts = joined(*plates, box([0.0, 4, 0], [7, 5, 2]))
+    solid = solid_of(*parts, resolution=70)  # voxels of 0.1
+    for origin, way, x in (
+        ([-9.0, 1, 1], [1.0, 0, 0], 0.5),
+        ([20.0, 1, 1], [-1.0, 0, 0], 5.5),
+        ([-9.0, 4.5, 1], [1.0, 0, 0], 3.5),
+    ):
+        found = solid.middle(np.array(origin), length * np.array(way))
+        np.testing.assert_allclose(found, [x, origin[1], 1.0], atol=0.06)  # half a voxel
+    assert solid.middle(np.array([-9.0, 1, 1]), np.array([-1.0, 0, 0])) is None  # behind
+    assert solid.middle(np.array([-9.0, 1, 9]), np.array([1.0, 0, 0])) is None

@@ -168,7 +168,9 @@ def anatomy_of(
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
 
-def sagittal_plane(solid: Solid, up: Floats, lateral: Floats | None) -> tuple[Floats, float, float]:
+def sagittal_plane(
+    solid: Solid, up: Floats, lateral: Floats | None = None
+) -> tuple[Floats, float, float]:
     """Return normal and offset of the vertical plane of best mirror symmetry, and the symmetry."""
     from scipy import ndimage
 

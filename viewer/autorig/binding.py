@@ -37,6 +37,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import axis_rotations as about_axis
 from viewer.rigs.geometry.transform import affine_matrices, apply_transform
 from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.shape import shaped_skeleton
@@ -49,6 +50,8 @@ _METHODS: dict[str, tuple[_Weigh, str]] = {
     "heat": (bone_heat, "bone heat"),
     "voxel": (geodesic_voxels, "geodesic voxels"),
 }
+
+_enclosed: Memo[Mesh, tuple[Welded, Solid]] = Memo()
 
 # Place of the skeleton.
 _ENOUGH = 0.5  # fraction of joints inside with which a skeleton may be where it should be
@@ -67,12 +70,21 @@ _NORMALISED = (2.0, 1.0)
 _ROUNDING = 1e-9
 
 
+def enclosed(target: Mesh) -> tuple[Welded, Solid]:
+    """Return the surface of a mesh and the solid in it, which all skeletons have in common."""
+
+    def make() -> tuple[Welded, Solid]:
+        mesh = one_sided(weld(target.positions, target.triangles))
+        return mesh, solid_of(mesh.positions, mesh.triangles)
+
+    return _enclosed.get(target, None, make)
+
+
 def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
     """Bind a mesh to the posed skeleton of a figure; see ``transfer``, which checks the mesh."""
     report_fraction(0.0, "voxels")
-    mesh = one_sided(weld(target.positions, target.triangles))
     with part_of_work(span=(0.0, 0.2)):
-        solid = solid_of(mesh.positions, mesh.triangles)
+        mesh, solid = enclosed(target)
     skeleton = shaped_skeleton(source, pose.shape_weights)
     report_fraction(0.2, "placing the skeleton")
     place = placement_matrix(pose)

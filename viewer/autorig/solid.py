@@ -37,10 +37,11 @@ _OFFSETS = np.sqrt([2.0, 3.0, 5.0]) * 1e-3
 _BLOCK = 1 << 22  # pairs of triangle and ray per batch
 _SAMPLES = 4.0  # samples of the surface per square of one voxel
 _WIDEST_GAP = 0.1  # longest gap between components that is bridged, as a fraction of the side
+_RAY_STEP = 0.25  # distance of the points of a ray that are looked up, in voxels
 _ROUNDS = 40  # most rounds of bridging
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Solid:
     """A grid of voxels in the mesh's space."""
 
@@ -72,6 +73,28 @@ class Solid:
     def nearest(self, points: Floats) -> Ints:
         """Return the row in ``voxels`` of the nearest voxel of the solid: (N,)."""
         return np.asarray(self.tree.query(points)[1], dtype=np.int32)
+
+    def middle(self, origin: Floats, direction: Floats) -> Floats | None:
+        """Return the point (3,) of a ray halfway between entering the solid and leaving it.
+
+        None if the ray, with a direction (3,) of any length, passes the solid.
+        """
+        direction = direction / np.linalg.norm(direction)
+        # The ray crosses the grid's sphere near its point closest to the centre.
+        sides = self.spacing * np.array(self.inside.shape)
+        center = self.origin + 0.5 * (sides - self.spacing)
+        along, reach = float((center - origin) @ direction), 0.5 * float(np.linalg.norm(sides))
+        count = int(np.ceil(2.0 * reach / (_RAY_STEP * self.spacing))) + 1
+        steps = along + np.linspace(-reach, reach, count)
+        steps = steps[steps >= 0.0]
+        # Voxels at the border of the grid are outside, and so are points beyond it.
+        inside = self.inside[tuple(self.voxel_of(origin + steps[:, None] * direction).T)]
+        if not inside.any():
+            return None
+        first = int(inside.argmax())
+        after = np.flatnonzero(~inside[first:])
+        last = first + int(after[0]) - 1 if len(after) else len(steps) - 1
+        return np.asarray(origin + 0.5 * (steps[first] + steps[last]) * direction)
 
     def gaps(self, points: Floats) -> Floats:
         """Return the distances of points (N, 3) from the nearest voxels' centres: (N,)."""

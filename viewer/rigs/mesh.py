@@ -26,7 +26,7 @@ _SAMPLE = 4096  # number of vertices sampled for the median
 _ROW = 64  # points per row of a reduction, see bounding_box
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Mesh:
     """An indexed triangle mesh, in the bind pose."""
 

@@ -19,7 +19,7 @@ from viewer.rigs.geometry.topology import Indices, components, welded
 _NEAR = 1e-4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Welded:
     """A mesh without coincident vertices."""
 

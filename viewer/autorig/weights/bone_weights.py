@@ -22,6 +22,7 @@ from viewer.errors import RigError
 from viewer.progress import part_of_work, report, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.memo import Memo
 from viewer.rigs.retargeting.joint_names import name_tokens
 from viewer.rigs.skeleton import Skeleton, shown_joints, shown_parents
 
@@ -46,11 +47,17 @@ _SHORTEST = 1e-4  # least distance that heats, relative to the mesh's size
 _BLIND = 1.5  # length in voxels at both ends of a ray that may leave the solid
 _EQUAL = 1e-4  # relative difference up to which bones are equally near, as at a joint
 _LEAST = 1e-3  # weights below this are dropped: they decay, but never end
-_BLOCK = 1 << 22  # unknowns per batch, 32 MB
+_BLOCK = 1 << 22  # most unknowns in a batch, and most lengths that are kept: 32 MB
 
 # Exponent of the fall-off with the geodesic distance. Dionne and de Lasa (eq. 6) have 2 to 4.
 # Deformations of the same characters are better with 8: less of a limb follows its neighbours.
 _FALL_OFF = 8.0
+
+_surfaces: Memo[Welded, tuple[csr_array, Floats]] = Memo()
+_graphs: Memo[Solid, csr_array] = Memo()
+_paths: Memo[Welded, dict[bytes, Floats]] = Memo()
+"""What several skeletons in the same mesh have in common: Laplace operator, graph of the voxels,
+and lengths of paths (W,) from the voxels of each bone."""
 
 # Parts.
 _RIGID = 0.8  # fraction of a part's vertices that are nearest to one joint, so that it is rigid
@@ -234,7 +241,8 @@ def bone_heat(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
     # The equilibrium of a surface with the Laplacian L (negative of the usual sign), vertex areas M
     # and heat H_i = c / d_i^2 from the nearest bones p_i is (L + M H) w = M H p (Baran and Popović
     # 2007, section 4). The mesh is scaled to size 1.
-    operator, areas = laplacian(replace(mesh, positions=mesh.positions / size))
+    scaled = replace(mesh, positions=mesh.positions / size)
+    operator, areas = _surfaces.get(mesh, None, lambda: laplacian(scaled))
     heated = np.isfinite(distances)
     ratio = np.maximum(np.where(heated, distances / size, 1.0), _SHORTEST)
     heat = np.where(heated, _HEAT * areas / ratio**2, 0.0)
@@ -256,16 +264,26 @@ def geodesic_voxels(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
     from scipy import sparse
     from scipy.sparse import csgraph
 
-    joints, graph = bones.joints.tolist(), solid.graph()
-    rows, places = solid.nearest(mesh.positions), solid.nearest(bones.points)
+    joints, places = bones.joints.tolist(), solid.nearest(bones.points)
     # From the surface to the first voxel, the path is straight.
-    first = solid.gaps(mesh.positions)
+    first, rows = solid.tree.query(mesh.positions)
+    known = _paths.get(mesh, solid, dict)
+    measured: dict[bytes, Floats] = {}
     lengths = np.empty((len(rows), len(joints)))
     for column, joint in enumerate(joints):
         report(column, len(joints), "", "measuring paths")
         sources = np.unique(places[bones.starts[joint] : bones.starts[joint + 1]])
-        found = csgraph.dijkstra(graph, directed=False, indices=sources, min_only=True)
-        lengths[:, column] = found[rows] + first
+        key = sources.tobytes()
+        if key not in known:
+            # Of a symmetric matrix, the steps in the stored direction suffice.
+            graph = _graphs.get(solid, None, solid.graph)
+            found = csgraph.dijkstra(graph, indices=sources, min_only=True)
+            known[key] = found[rows] + first
+        lengths[:, column] = measured[key] = known[key]
+    # Only bones of the last skeleton are kept: after an edit, most of them are the same.
+    known.clear()
+    if lengths.size <= _BLOCK:
+        known.update(measured)
     distances = lengths.min(axis=1, initial=np.inf)
     floor = np.finfo(float).tiny
     # w_j ~ d_j^-k, scaled by the least distance so that no power overflows.
