@@ -102,6 +102,8 @@ _SIDES = {
     **dict.fromkeys(("l", "left", "lft", "lt", "hidari", "左"), "left"),
     **dict.fromkeys(("r", "right", "rgt", "rt", "migi", "右"), "right"),
 }
+_PAIRS = (("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi"))
+_OTHER_SIDES = dict([*_PAIRS, ("左", "右"), *((b, a) for a, b in _PAIRS), ("右", "左")])
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 _FILLERS = {"jnt", "jt", "bn"}  # words for "joint", removed wherever they are
@@ -136,6 +138,31 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
     """
     return [*_known_keys(tuple(names))]
+
+
+def other_side(name: str) -> str:
+    """Return the name of the joint on the other side, in the same style; empty without a side.
+
+    >>> other_side("LeftFoot"), other_side("hand.R"), other_side("lfemur"), other_side("spine")
+    ('RightFoot', 'hand.L', 'rfemur', '')
+    """
+    side, word = _key(name_tokens(name))
+    if not side:
+        return ""
+    wanted = ("right" if side == "left" else "left"), word
+    # A side without a separator is at either end of a name.
+    ends = [(0, n) for n in (5, 4, 1)] + [(len(name) - n, len(name)) for n in (5, 4, 1)]
+    spans = [found.span() for found in _TOKEN.finditer(name)] + ends
+    for start, end in spans:
+        old = name[max(start, 0) : end]
+        new = _OTHER_SIDES.get(old.lower(), "")
+        if not new:
+            continue
+        cased = new.upper() if old.isupper() else new.title() if old.istitle() else new
+        swapped = f"{name[:start]}{cased}{name[end:]}"
+        if _key(name_tokens(swapped)) == wanted:
+            return swapped
+    return ""
 
 
 @lru_cache(16)
