@@ -171,7 +171,7 @@ def test_folder_that_cannot_be_stored_shows_the_reason(hand, models):
 def test_pose_shortcuts_are_listed_and_shown(box, texts):
     table = {key.label: key.text for key in KEYS}
     wanted = {
-        "M": "mirror the pose left to right",
+        "M": "mirror the pose, or edited joints",
         "Ctrl+C": "copy the pose",
         "Ctrl+Shift+C": "copy the pose as raw pose values",
         "Ctrl+V": "paste a pose",

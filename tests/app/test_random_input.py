@@ -14,7 +14,6 @@ from formats.synthetic_smpl import model
 from imgui_bundle import imgui
 from PIL import Image
 
-from viewer.app import menus
 from viewer.app.files.files import open_files
 from viewer.app.posing import posing
 
@@ -116,7 +115,7 @@ def _body_files(folder):
 def _keep_inside(folder, monkeypatch):
     """Let dialogs browse any folder, but write only into the given folder."""
     monkeypatch.setenv("HOME", str(folder))
-    for module, name in ((posing, "save_pose"), (menus, "save_export")):
+    for module, name in ((posing, "save_pose"), (posing, "save_export")):
         save = getattr(module, name)
 
         def save_inside(state, path, save=save):

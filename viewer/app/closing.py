@@ -17,9 +17,10 @@ from viewer.app.curves.editing import ask_for_clip
 from viewer.app.files.files import Files
 from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.playback.animations import choose_animation
-from viewer.app.posing.posing import ask_for_pose, pose_of_file
+from viewer.app.posing.posing import ask_for_export, ask_for_pose, pose_of_file
 from viewer.app.retargeting.drive_changes import shown_drive
 from viewer.app.retargeting.joint_match_panel import ask_where_to_save
+from viewer.app.rigging.joint_editing import is_unsaved
 from viewer.app.rigging.results import ask_where_to_save_rig, shown_result
 from viewer.app.rigging.rigging import Rigging
 from viewer.data_classes import dataclass
@@ -27,7 +28,7 @@ from viewer.formats import opened_text
 from viewer.phrases import printable
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.motion.spring_motion import release_springs
-from viewer.rigs.pose import Pose, pose_of
+from viewer.rigs.pose import Pose, PoseKey, pose_of
 from viewer.rigs.scene import Actor
 
 _MOST_LISTED = 6
@@ -250,8 +251,15 @@ def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
         _is_same(actor, pose)
         or (actor.clip is not None and _is_same(actor, state.clock.posed(actor, pose)))
         for key in (first, *state.of(SavedWork).poses_of(actor))
+        if _fits(actor, key)
         for pose in _with_resets(actor.figure, pose_of(key))
     )
+
+
+def _fits(actor: Actor, key: PoseKey) -> bool:
+    """Return whether a pose is one of the actor's joints, which may have been edited since."""
+    pose, own = pose_of(key), actor.require_pose()
+    return (len(pose.dofs), len(pose.rotations)) == (len(own.dofs), len(own.rotations))
 
 
 def _with_resets(figure: Figure, pose: Pose) -> list[Pose]:
@@ -287,14 +295,24 @@ def _matches(state: AppState) -> list[_Unsaved]:
 
 
 def _rigs(state: AppState) -> list[_Unsaved]:
-    """Return the rig that the Rig panel shows; the other method's is an alternative to it."""
+    """Return edited rigs and the one of the Rig panel; the other method's is an alternative."""
+    saved = state.of(SavedWork)
+    found = [
+        _Unsaved(
+            f"{printable(actor.name, _LONGEST)}: rig",
+            _for_actor(row, partial(ask_for_export, suffix=".glb")),
+        )
+        for row, actor in enumerate(state.scene.actors)
+        if is_unsaved(state, actor) and actor.figure not in saved
+    ]
     if state.of(Rigging).scene is not state.scene:
-        return []
+        return found
     result = shown_result(state)
-    if result is None or result in state.of(SavedWork):
-        return []
+    is_edited = result is not None and is_unsaved(state, result.actor)
+    if result is None or result in saved or is_edited:
+        return found
     text = f"{printable(result.target.name, _LONGEST)}: rig"
-    return [_Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]
+    return [*found, _Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]
 
 
 def draw_question(state: AppState) -> None:

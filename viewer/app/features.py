@@ -32,7 +32,6 @@ from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import (
     copy_numbers,
     copy_pose,
-    mirror,
     paste_pose,
     random_shape,
     reset_actor,
@@ -47,6 +46,7 @@ from viewer.app.retargeting.joint_match_panel import (
     ask_where_to_save,
     match_automatically,
 )
+from viewer.app.rigging.joint_editing import delete_joint, mirror
 from viewer.app.rigging.results import switch_version
 from viewer.app.view.camera_panel import fit_selection, fit_view, look, toggle_projection
 from viewer.app.view.display_panel import (
@@ -114,7 +114,8 @@ KEYS = (
     Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", given(choose_tool, "rotate")),
     Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", given(choose_tool, "move")),
     Shortcut((_K.x,), "X", "local, parent or world axes", next_orientation),
-    Shortcut((_K.m,), "M", "mirror the pose left to right", mirror),
+    Shortcut((_K.m,), "M", "mirror the pose, or edited joints", mirror),
+    Shortcut((_K.delete,), "Delete", "remove an edited joint", delete_joint),
     Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", copy_pose),
     Shortcut(
         (_CTRL | _SHIFT | _K.c,), "Ctrl+Shift+C", "copy the pose as raw pose values", copy_numbers

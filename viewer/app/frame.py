@@ -33,6 +33,7 @@ from viewer.app.posing.gizmo import draw_gizmo
 from viewer.app.posing.shape_panel import drop_unreadable_shapes
 from viewer.app.preferences.applying import follow_preferences
 from viewer.app.recording.recording import Preview, draw_record_dialog, start_recording
+from viewer.app.rigging.joint_editing import draw_joint_edits, update_joints
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
@@ -109,6 +110,7 @@ class Frame:
         follow_actor(state)
         keep_fitting(state, state.of(Files).stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
+        update_joints(state)
         advance_closing(state)  # after a new rig, which is unsaved, has been put into the scene
         hover_joint(state)
         self._draw_scene(scale)
@@ -152,6 +154,7 @@ class Frame:
             draw_hovered_name(state)
             draw_gizmo(state)
             draw_rig_tools(state)
+            draw_joint_edits(state)
             if state.panels_visible:
                 draw_hints(state)
                 draw_axis_gizmo(state)

@@ -19,6 +19,7 @@ from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.preferences import CAPTURED, Appearance, Preferences
 from viewer.app.preferences.preferences_window import close_preferences
 from viewer.app.recording.recording import RecordingState
+from viewer.app.rigging.joint_editing import cancel_joint_drag, stop_editing
 from viewer.app.rigging.tools import drop_rig_tool
 from viewer.app.weights.weights_panel import Weights, unpin
 from viewer.data_classes import dataclass
@@ -134,7 +135,7 @@ def cancel(state: AppState) -> None:
     keyboard = state.of(Keyboard)
     linting = state.of(Linting)
     manual = state.of(Manual)
-    if cancel_drag(state):
+    if cancel_drag(state) or cancel_joint_drag(state):
         return
     if state.error:
         state.error = ""
@@ -166,6 +167,8 @@ def cancel(state: AppState) -> None:
         keyboard.is_listed = False
     elif drop_rig_tool(state):
         state.say_status("Template tool off")
+    elif stop_editing(state):
+        state.say_status("Edit skeleton is off")
     elif linting.chosen >= 0:
         linting.chosen = -1
     elif state.of(Weights).pinned is not None:

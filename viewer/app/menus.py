@@ -24,32 +24,30 @@ from viewer.app.curves.editing import new_clip
 from viewer.app.files.files import (
     Files,
     ask_for_files,
-    ask_where_to_write,
     open_bundled_body,
     open_bundled_figure,
     open_files,
 )
 from viewer.app.files.model_menu import draw_model_menu
-from viewer.app.files.motion_export import N_ROWS, ask_for_motion, draw_pose_formats, pose_formats
+from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.keys import Keyboard, want_screenshot
 from viewer.app.layout import PANELS, is_open, reset_layout, toggle_panel
 from viewer.app.linting.lint_panel import check_rig
 from viewer.app.manual import draw_manual_menu
 from viewer.app.palette import toggle_palette
 from viewer.app.posing.posing import (
+    ask_for_export,
     ask_for_pose,
     copy_numbers,
     copy_pose,
     mirror,
     paste_pose,
     reset_pose,
-    save_export,
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
 from viewer.app.view.display_panel import draw_view_menu
-from viewer.exporters import files_written
-from viewer.formats import file_stem, opened_text
+from viewer.formats import opened_text
 from viewer.phrases import printable
 
 
@@ -113,21 +111,6 @@ def _draw_items(state: AppState, *actions: Action) -> None:
     for action in actions:
         if menu_item(state, action.text, action.key, why=action.reason(state)):
             action.run(state)
-
-
-def ask_for_export(state: AppState) -> None:
-    """Ask where to export the chosen actor in its current pose."""
-    suffixes = tuple(pose_formats())
-    ask_where_to_write(
-        state,
-        save_export,
-        "Export",
-        suffixes,
-        f"{file_stem(state.actor.name)}.obj",
-        more=draw_pose_formats,
-        more_rows=N_ROWS,
-        written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
-    )
 
 
 _BUNDLED = (

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import choose_joint, use_handles
 from viewer.app.posing.posing import Posing
+from viewer.app.rigging.joint_editing import JointEditing, hold_joint
 from viewer.app.rigging.rigging import Rigging
 from viewer.app.rigging.tools import holds_mouse
 from viewer.app.view.axis_gizmo import holds_gizmo
@@ -36,7 +37,7 @@ def handle_mouse(state: AppState) -> None:
     picking = state.of(Picking)
     io = imgui.get_io()
     x, y, width, height = state.view_rect
-    if use_handles(state) or holds_mouse(state) or holds_gizmo(state):
+    if use_handles(state) or hold_joint(state) or holds_mouse(state) or holds_gizmo(state):
         return
     if io.want_capture_mouse or width < 1 or height < 1:
         return
@@ -86,7 +87,8 @@ def is_held(state: AppState) -> bool:
     drag = state.of(Posing).drag
     is_dragged = drag is not None and not drag.is_over
     moves_template = state.of(Rigging).holds_mouse and imgui.is_mouse_down(imgui.MouseButton_.left)
-    return _is_widget_held() or is_dragged or moves_template
+    moves_joint = state.of(JointEditing).drag is not None
+    return _is_widget_held() or is_dragged or moves_template or moves_joint
 
 
 def _is_widget_held() -> bool:

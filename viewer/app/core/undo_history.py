@@ -1,4 +1,4 @@
-"""Undo and redo: every change of pose, clip or display is one step, as is a slider drag."""
+"""Undo and redo: every change of rig, pose, clip or display is one step, as is a slider drag."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Protocol
 from viewer.app.core.scene_version import ActorVersion, SceneVersion, version_of
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
+from viewer.rigs.figure import Figure
 from viewer.rigs.motion.sampled_clip import with_rate
 from viewer.rigs.pose import PoseKey, pose_of
 from viewer.rigs.scene import Actor, Motion, Scene
@@ -96,7 +97,9 @@ class History:
             other = new.get(id(one.actor))
             if other is None or one.pose is None or one.pose == other.pose:
                 continue
-            if one.clip is other.clip:
+            if _rig(one) != _rig(other):
+                self.first_poses.pop(one.actor, None)  # it may have other joints
+            elif one.clip is other.clip:
                 self.first_poses.setdefault(one.actor, one.pose)
 
     def exchange_actor(self, old: Actor, new: Actor) -> None:
@@ -114,6 +117,18 @@ class History:
 
         def exchanged(one: _Snapshot) -> _Snapshot:
             return replace(one, kept=new) if one.kept is old else one
+
+        self._replace(exchanged)
+
+    def exchange_figure(self, old: Figure, new: Figure) -> None:
+        """Replace a figure by one with more information, without recording a step."""
+
+        def exchanged(state: _Snapshot) -> _Snapshot:
+            actors = (
+                one._replace(figure=new) if one.figure is old else one
+                for one in state.version.actors
+            )
+            return replace(state, version=replace(state.version, actors=tuple(actors)))
 
         self._replace(exchanged)
 
@@ -194,6 +209,7 @@ class History:
         if self.feature is not None:
             self.feature.restore(there.kept)
         if not _have_same_motion(here.version, there.version):
+            _restore_rigs(here.version, there.version)
             _restore_motion(there.version, scene)
             pose_at(there.time)
             time = there.time if scene.time is None else scene.time
@@ -276,9 +292,23 @@ def _is_same(one: _Snapshot, other: _Snapshot) -> bool:
 
 
 def _have_same_motion(one: SceneVersion, other: SceneVersion) -> bool:
-    """Return whether two states have the same actors, clips and poses."""
-    a, b = ([(x.actor, x.clip, x.offset, x.pose) for x in v.actors] for v in (one, other))
+    """Return whether two states have the same actors, rigs, clips and poses."""
+    a, b = ([(x.actor, _rig(x), x.clip, x.offset, x.pose) for x in v.actors] for v in (one, other))
     return a == b
+
+
+def _rig(one: ActorVersion) -> tuple[object, object]:
+    """Return the parts of a figure that edits of its joints replace."""
+    return one.figure.skeleton, one.figure.skin
+
+
+def _restore_rigs(here: SceneVersion, there: SceneVersion) -> None:
+    """Restore the figures of actors whose rig differs; other changes of figures are not edits."""
+    now = {id(one.actor): one for one in here.actors}
+    for one in there.actors:
+        known = now.get(id(one.actor))
+        if known is not None and _rig(known) != _rig(one):
+            one.actor.figure = one.figure
 
 
 def _restore_motion(version: SceneVersion, scene: Scene) -> None:

@@ -401,4 +401,4 @@ def save_clip(state: AppState, path: Path) -> None:
     """Write the chosen actor's clip if it is keyed."""
     clip = state.actor.clip
     if clip is not None and clip.kind == "curves":
-        save_files(state, lambda: write(clip, path), [path], saved=clip)
+        save_files(state, lambda: write(clip, path), [path], saved=[clip])

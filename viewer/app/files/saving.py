@@ -19,13 +19,13 @@ from viewer.rigs.arrays import Bytes
 
 @shows_errors
 def save_files(
-    state: AppState, act: Callable[[], object], files: list[Path], saved: object = None
+    state: AppState, act: Callable[[], object], files: list[Path], saved: Iterable[object] = ()
 ) -> None:
     """Write files unless the scene was read from one of them, and show the result."""
     # The dialog has already asked whether to replace existing files.
     check_targets(files, state.inputs, force=True)
     act()
-    state.of(SavedWork).add(saved)
+    state.of(SavedWork).add(*saved)
     state.say(_saved(files))
 
 
@@ -35,7 +35,7 @@ def save_in_background(
     act: Callable[[], Iterable[object]],
     files: Sequence[Path],
     inputs: Sequence[Path] = (),
-    saved: object = None,
+    saved: Iterable[object] = (),
 ) -> None:
     """Write files in a job, all or none; no input, nor a file of the scene, may be replaced."""
     if why := no_job_room(state):
@@ -51,7 +51,7 @@ def save_in_background(
         return [*map(str, notes), _saved(files)]
 
     title, known = f"Writing {printable(files[0].name, 60)}", state.of(SavedWork)
-    finish = partial(known.add, saved)
+    finish = partial(known.add, *saved)
     state.job = ThreadJob(title, write, finish, "export", names_steps=False)
 
 

@@ -72,7 +72,7 @@ _WHOLE = 2.0 * math.pi
 _ROUNDING = 1e-6  # tolerance within which a value is at a limit, radians
 
 
-class _Pen:
+class Pen:
     """Draws points of the scene as lines in the window; sizes are in points."""
 
     def __init__(self, frame: ViewFrame) -> None:
@@ -285,7 +285,7 @@ def draw_gizmo(state: AppState) -> None:
     x, y, width, height = state.view_rect
     if not posing.is_on or min(width, height) < 40.0 or no_tool(state):
         return
-    pen, posed = _Pen(view_frame(state)), selected(state)
+    pen, posed = Pen(view_frame(state)), selected(state)
     pen.list.push_clip_rect((x, y), (x + width, y + height), True)
     hot = None if _drag(state) else _hovered(state, pen.frame)
     _draw_joints(state, pen)
@@ -314,7 +314,7 @@ def _hovered(state: AppState, frame: ViewFrame) -> Handle | None:
     return handle_at(state, frame, (io.mouse_pos.x, io.mouse_pos.y))
 
 
-def _draw_joints(state: AppState, pen: _Pen) -> None:
+def _draw_joints(state: AppState, pen: Pen) -> None:
     """Draw a dot for each joint, and the name of the one under the pointer."""
     places, io = joint_places(state), imgui.get_io()
     seen = np.flatnonzero(np.isfinite(places).all(axis=1))
@@ -331,7 +331,7 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
         x, y = places[under].tolist()
         hot, one = imgui.get_color_u32((*_HOT, 1.0)), pen.scale
         pen.list.add_circle((x, y), 7.0 * one, hot, 0, 2.0 * one)
-        _text_box(
+        text_box(
             state,
             pen,
             (x + 12.0 * one, y - 8.0 * one),
@@ -339,7 +339,7 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
         )
 
 
-def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
+def _draw_arcs(state: AppState, pen: Pen, posed: PosedJoint) -> None:
     """Draw the limits of the joint's rotations."""
     assert state.actor.pose is not None  # limits imply a posed joint
     unit = pen.frame.unit_length(posed.center)
@@ -357,7 +357,7 @@ def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
         pen.dot(present, 3.5, ink)
 
 
-def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
+def _draw_rings(state: AppState, pen: Pen, posed: PosedJoint, hot: Handle | None) -> None:
     """Draw the rings of the joint; during a drag, draw only the grabbed ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
     if drag is not None and isinstance(drag.handle, RotateHandle):
@@ -387,7 +387,7 @@ def _runs(flags: np.ndarray) -> list[list[int]]:
     return [list(range(first, min(last + 1, len(flags)))) for first, last in pairs]
 
 
-def _draw_rotation(pen: _Pen, posed: PosedJoint, handle: RotateHandle, angle: float) -> None:
+def _draw_rotation(pen: Pen, posed: PosedJoint, handle: RotateHandle, angle: float) -> None:
     """Draw the ring that is held, and the sector of its rotation."""
     unit = pen.frame.unit_length(posed.center)
     ring, radius = handle.ring, handle.ring.size * unit
@@ -402,7 +402,7 @@ def _draw_rotation(pen: _Pen, posed: PosedJoint, handle: RotateHandle, angle: fl
         pen.line(np.stack([posed.center, end]), (*_HOT, 0.9), 2.0)
 
 
-def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
+def _draw_chain(state: AppState, pen: Pen, posed: PosedJoint) -> None:
     """Draw the chain from the selected joint up to the last joint that may rotate."""
     skeleton, drag = posed.skeleton, _drag(state)
     chain = used_chain(skeleton, posed.joint, state.of(Posing).chain_length).tolist()
@@ -426,7 +426,7 @@ def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
         pen.dot(target, 5.0, (*_LIMIT, 1.0), filled=False)
 
 
-def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
+def _draw_arrows(state: AppState, pen: Pen, posed: PosedJoint, hot: Handle | None) -> None:
     """Draw the handle at the joint, and the arrows along which it is translated."""
     drag = _drag(state)
     held = drag.handle if drag is not None else hot
@@ -451,7 +451,7 @@ def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | No
         pen.list.add_triangle_filled(tuple(tip), tuple(wings[0]), tuple(wings[1]), color)
 
 
-def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
+def _draw_text(state: AppState, pen: Pen, posed: PosedJoint) -> None:
     """Draw the result of the drag as text, with the limits that restrict it."""
     center, drag = pen.frame.place(posed.center), _drag(state)
     if center is None or drag is None or not drag.outcome.text:
@@ -462,11 +462,11 @@ def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
         lines.append((limits, (*_LIMIT, 1.0)))
     away = 1.2 * RADIUS + _GAP if state.of(Posing).tool == "rotate" else 2.0 * _GAP
     corner = (center[0] + away * pen.scale, center[1] - 2.0 * _GAP * pen.scale)
-    _text_box(state, pen, corner, lines)
+    text_box(state, pen, corner, lines)
 
 
-def _text_box(
-    state: AppState, pen: _Pen, corner: tuple[float, float], lines: Sequence[tuple[str, _Color]]
+def text_box(
+    state: AppState, pen: Pen, corner: tuple[float, float], lines: Sequence[tuple[str, _Color]]
 ) -> None:
     """Draw lines of text on a dark background, within the view."""
     x, y, width, height = state.view_rect

@@ -106,7 +106,7 @@ class ReachHandle:
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
         """Return the pose that moves the joint to the pointer, at its initial depth."""
-        target = _dragged(self.posed.center, self.place, frame, place)
+        target = dragged(self.posed.center, self.place, frame, place)
         inside = np.linalg.solve(self.posed.placement, np.append(target, 1.0))[:3]
         found = self._reaching.follow(inside)
         pose = self.start.copy()
@@ -133,7 +133,7 @@ class MoveHandle:
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
         """Return the pose with the joint, or the whole figure, translated to the pointer."""
         if self.arrow is None:
-            way = _dragged(self.posed.center, self.place, frame, place) - self.posed.center
+            way = dragged(self.posed.center, self.place, frame, place) - self.posed.center
         else:
             way = self._along(frame, place) * self.arrow.axis
         rows = translation_dofs(self.posed.skeleton, self.joint)
@@ -167,7 +167,7 @@ class MoveHandle:
         return Outcome(pose, shift_text("figure", way))
 
 
-def _dragged(center: Floats, first: Place, frame: ViewFrame, place: Place) -> Floats:
+def dragged(center: Floats, first: Place, frame: ViewFrame, place: Place) -> Floats:
     """Return the target of a dragged joint: it keeps its depth and its offset from the pointer."""
     start = frame.at_depth_of(center, first)
     return np.asarray(center + frame.at_depth_of(center, place) - start)

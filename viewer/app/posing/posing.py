@@ -14,6 +14,7 @@ from viewer.app.core.saved_work import SavedPose
 from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
+from viewer.app.files.motion_export import N_ROWS, draw_pose_formats, pose_formats
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
@@ -47,6 +48,7 @@ ORIENTATIONS: dict[Orientation, str] = {
     "world": "World axes",
 }
 """Orientations of rings and arrows, for joints that can rotate about or move along all axes."""
+_RIGS = (".glb", ".gltf", ".vrm", ".skel", ".skin")  # suffixes of files with joints and weights
 _RANDOM = 10  # number of random coefficients: the first have the largest variance
 
 
@@ -222,6 +224,21 @@ def save_pose(state: AppState, path: Path) -> None:
         save_files(state, act, [path], _saved(actor))
 
 
+def ask_for_export(state: AppState, suffix: str = ".obj") -> None:
+    """Ask where to export the chosen actor in its current pose."""
+    suffixes = tuple(pose_formats())
+    ask_where_to_write(
+        state,
+        save_export,
+        "Export",
+        suffixes,
+        f"{file_stem(state.actor.name)}{suffix}",
+        more=draw_pose_formats,
+        more_rows=N_ROWS,
+        written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
+    )
+
+
 @shows_errors
 def save_export(state: AppState, path: Path) -> None:
     """Write the chosen actor in its current pose for other programs, in the background."""
@@ -230,12 +247,14 @@ def save_export(state: AppState, path: Path) -> None:
     actor = upright_actor(state.scene, state.actor).copy()
     skinning = replace(state.options.skinning)
     act, saved = lambda: export(actor, path, skinning), _saved(state.actor)
+    if path.suffix.lower() in _RIGS:
+        saved = [*saved, state.actor.figure]
     save_in_background(state, act, files, saved=saved)
 
 
-def _saved(actor: Actor) -> SavedPose | None:
+def _saved(actor: Actor) -> list[object]:
     """Return the present pose of an actor, to record that a file contains it."""
-    return None if actor.pose is None else SavedPose(actor, pose_key(actor.pose))
+    return [] if actor.pose is None else [SavedPose(actor, pose_key(actor.pose))]
 
 
 def mirror(state: AppState) -> None:

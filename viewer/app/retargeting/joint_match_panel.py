@@ -493,7 +493,7 @@ def _save(state: AppState, path: Path) -> None:
     def act() -> None:
         write_joint_map(full_map(drive, actor.figure), path, titles)
 
-    save_files(state, act, [path], saved=drive.joint_map)
+    save_files(state, act, [path], saved=[drive.joint_map])
 
 
 _BUTTONS = (

@@ -26,7 +26,7 @@ from viewer.app.core.widgets import (
 from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
-from viewer.app.rigging.rigging import Comparison, Result, Rigging, no_results
+from viewer.app.rigging.rigging import Comparison, Result, Rigging, is_intact, no_results
 from viewer.autorig.rigged import clip_for
 from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
@@ -97,10 +97,12 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
     chosen = state.actor
     for result in results:
         old = view.results.get(result.method)
-        row = _row(actors, old.actor) if old is not None else -1
+        row = _row(actors, old.actor) if old is not None and is_intact(old) else -1
         if row >= 0:
             actors[row] = result.actor
-        elif not any(_row(actors, one.actor) >= 0 for one in view.results.values()):
+        elif not any(
+            _row(actors, one.actor) >= 0 and is_intact(one) for one in view.results.values()
+        ):
             # The target moves to the end, so that the other actors keep their numbers.
             actors[_row(actors, target)] = result.actor
             actors.append(target)
@@ -142,7 +144,8 @@ def _versions(state: AppState) -> dict[str, Actor]:
     view, actors = state.of(Rigging), state.scene.actors
     if view.target is None:
         return {}
-    found = {TARGET: view.target} | {name: one.actor for name, one in view.results.items()}
+    found = {TARGET: view.target}
+    found |= {name: one.actor for name, one in view.results.items() if is_intact(one)}
     return {name: actor for name, actor in found.items() if _row(actors, actor) >= 0}
 
 
@@ -278,7 +281,7 @@ def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result in the background: all of its files or none."""
     files = files_of(path)
     inputs = result.template.paths
-    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, result)
+    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, [result])
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
@@ -313,7 +316,11 @@ def draw_results(state: AppState) -> None:
     """Draw the choice of version and colours, the statistics of each method, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
-        imgui.text_wrapped(f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it.")
+        redone = f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it."
+        is_edited = not all(is_intact(one) for one in state.of(Rigging).results.values())
+        imgui.text_wrapped(
+            "Its joints were edited: File > Export saves it." if is_edited else redone
+        )
         return
     shown = _shown_version(state)
     for number, name in enumerate(_versions(state)):

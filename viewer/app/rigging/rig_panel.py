@@ -27,6 +27,7 @@ from viewer.app.core.widgets import (
     warning,
 )
 from viewer.app.files.files import ask_for_files
+from viewer.app.rigging import joint_editing
 from viewer.app.rigging.placing import (
     aligned_template,
     box_fit,
@@ -111,6 +112,8 @@ def draw(state: AppState) -> None:
     why = no_target(state)
     if why:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
+    if _section("Edit skeleton", "joints placed and moved by hand"):
+        joint_editing.draw_section(state)
     with disabled(state, why or no_placing(state)):
         if _section("Align", "align the template with the target"):
             _draw_alignment(state)

@@ -368,9 +368,15 @@ def no_target(state: AppState) -> str:
     return f"every mesh in the scene has a rig: add a mesh without one, {one_of(MESHES)}"
 
 
+def is_intact(result: Result) -> bool:
+    """Return whether an actor still shows a result: its joints may have been edited since."""
+    return result.actor.figure is result.rigged.figure
+
+
 def no_results(state: AppState) -> str:
     """Return the reason why there is no rigged mesh to show."""
     there = {id(actor) for actor in state.scene.actors}
-    if any(id(result.actor) in there for result in state.of(Rigging).results.values()):
+    results = state.of(Rigging).results.values()
+    if any(id(result.actor) in there and is_intact(result) for result in results):
         return ""
     return "nothing is rigged yet: press Run"

@@ -67,7 +67,7 @@ _CALLED: dict[TransferMethod, str] = {
 """Words that are appended to the mesh's name."""
 
 
-def _begin(state: AppState, title: str, act: Callable[[], _Finish], output: str = "") -> None:
+def begin_work(state: AppState, title: str, act: Callable[[], _Finish], output: str = "") -> None:
     """Start a job in a thread; the frame loop later calls the function that the job returns."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
@@ -121,7 +121,7 @@ def start_adding(state: AppState, paths: Sequence[Path]) -> None:
 
         return finish
 
-    _begin(state, f"Reading {printable(path.name, 60)}", act)
+    begin_work(state, f"Reading {printable(path.name, 60)}", act)
 
 
 def start_reading(state: AppState, paths: Sequence[Path] = (), then: _Finish | None = None) -> None:
@@ -141,7 +141,7 @@ def start_reading(state: AppState, paths: Sequence[Path] = (), then: _Finish | N
 
         return finish
 
-    _begin(state, "Reading the template", act)
+    begin_work(state, "Reading the template", act)
 
 
 def _snapshot(state: AppState, aligned: bool) -> Callable[[], Template]:
@@ -199,7 +199,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
         return finish
 
-    _begin(state, "Aligning", act)
+    begin_work(state, "Aligning", act)
 
 
 def _search_settings(state: AppState) -> AlignmentSettings:
@@ -229,6 +229,28 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
     )
 
 
+def aligned_start(state: AppState) -> Callable[[], tuple[Template, Similarity | None]]:
+    """Return a function that gives a thread the template, aligned with the target if necessary.
+
+    Its second result maps the template to the target; None for a skeleton without a mesh, which is
+    used where it is or where it fits.
+    """
+    take, known, own = _snapshot(state, aligned=True), placing_now(state), current_template(state)
+    mesh, settings = target_mesh(state), _search_settings(state)
+    fits = state.of(Rigging).choices.fits
+
+    def act() -> tuple[Template, Similarity | None]:
+        template, found = take(), known
+        if not template.figure.is_attached:
+            return template, None
+        if found is None:
+            with part_of_work("Aligning", (0.0, 0.7)):
+                found = align_template(template, own or template, mesh, settings, fits)
+        return found.fitted or template, found.similarity
+
+    return act
+
+
 def start_match(state: AppState) -> None:
     """Find the vertices of the target that match the template, and show them as colours."""
     rigging, placing = state.of(Rigging), placing_now(state)
@@ -244,7 +266,7 @@ def start_match(state: AppState) -> None:
         fields, fraction = _match_fields(template, similarity, mesh, settings)
         return lambda state: show_match(state, actor, fields, fraction)
 
-    _begin(state, "Finding closest points", act)
+    begin_work(state, "Finding closest points", act)
 
 
 def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
@@ -288,7 +310,7 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
 
         return finish
 
-    _begin(state, f"Rigging {printable(name, 40)}", act, "rigging")
+    begin_work(state, f"Rigging {printable(name, 40)}", act, "rigging")
 
 
 def align_template(

@@ -1,0 +1,223 @@
+"""Section "Edit skeleton": joints placed, dragged, removed and mirrored in the view."""
+
+import threading
+
+import numpy as np
+from autorig.rigged_shapes import arm
+from autorig.test_binding import box, joined
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.app.closing import unsaved_edits
+from viewer.app.core.view_frame import view_frame
+from viewer.app.posing.posing import save_export
+from viewer.app.rigging.joint_editing import JointEditing
+from viewer.autorig.pipeline import transfer
+from viewer.progress import report
+from viewer.rigs.figure import Figure
+from viewer.rigs.joint_edits import rest_worlds
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skinning import deform
+
+FAR = np.array([300.0, -200.0, 50.0])
+HALF = np.array([4.0, 0.5, 1.0])
+VOXEL = 8.0 / 96  # of the bar
+# Clicks are at whole positions of the pointer, and the middle is found in steps of the ray.
+ATOL = 0.6 * VOXEL
+
+
+def bar():
+    """Return a bar of 8 x 1 x 2 along x, far from the origin; its middle is at ``FAR``."""
+    return Figure("bar", joined(box(FAR - HALF, FAR + HALF, (16, 2, 2))))
+
+
+def opened(drive, *figures, start="root"):
+    """Return a test driver that edits the first figure, seen along -z without perspective."""
+    hand = drive(scene=Scene([Actor(figure) for figure in figures]), size=(1000, 900))
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    hand.state.of(JointEditing).start = start
+    hand.click("Edit skeleton")
+    hand.finish_job()
+    for key in ("_1", "_5", "f"):
+        hand.key(key)
+    return hand
+
+
+def figure(hand):
+    return hand.state.scene.actors[0].figure
+
+
+def names(hand):
+    return figure(hand).skeleton.names
+
+
+def joints(hand):
+    return rest_worlds(figure(hand))[:, :3, 3] - FAR
+
+
+def seen(hand, *point):
+    """Return where a point, relative to the middle of the bar, is in the window."""
+    return view_frame(hand.state).place(np.array(point) + FAR)
+
+
+def click(hand, *point):
+    hand.click(seen(hand, *point))
+    hand.finish_job()
+
+
+def pull(hand, start, end, held=""):
+    hand.pull(seen(hand, *start), seen(hand, *end), held=held)
+    hand.step(2)
+    hand.finish_job()
+
+
+def strongest(hand):
+    """Return the joint with the largest weight at each vertex."""
+    skin = figure(hand).skin
+    rows = [slice(*pair) for pair in zip(skin.starts[:-1], skin.starts[1:], strict=True)]
+    return np.array([skin.joints[row][skin.weights[row].argmax()] for row in rows])
+
+
+def undo(hand, held="ctrl"):
+    hand.key("z", held)
+    hand.step(2)
+
+
+def test_joints_are_placed_in_the_middle_and_weights_follow_a_drag(drive, tmp_path):
+    hand = opened(drive, bar())
+    assert names(hand) == ("root",)
+    assert_allclose(joints(hand)[0][1:], 0.0, atol=ATOL)  # the solid is as wide everywhere along x
+    pull(hand, joints(hand)[0], (-3.0, 0.0, 0.0))
+    click(hand, -1.0, 0.2, 1.0)
+    click(hand, 3.0, -0.3, 1.0)
+    assert names(hand) == ("root", "joint", "joint_2")
+    assert figure(hand).skeleton.parents.tolist() == [-1, 0, 1]
+    # The ray along -z enters the bar at z = 1 and leaves it at z = -1.
+    assert_allclose(joints(hand)[1:], [[-1, 0.2, 0], [3, -0.3, 0]], atol=ATOL)
+    # Bones meet at joint, so it bends the bar there: bones from -3 to -1, and from -1 to 3.
+    x = figure(hand).mesh.positions[:, 0] - FAR[0]
+    assert (strongest(hand)[x < -1.4] == 0).all() and (strongest(hand)[x > -0.6] != 0).all()
+    steps = hand.undo_steps
+    pull(hand, joints(hand)[1], (1.5, 0.0, 0.0), held="ctrl")
+    assert hand.undo_steps == steps + 1
+    assert_allclose(joints(hand)[1], [1.5, 0, 0], atol=ATOL)
+    assert_allclose(joints(hand)[2], [3, -0.3, 0], atol=ATOL)  # Ctrl: alone
+    assert (strongest(hand)[x < 1.1] == 0).all() and (strongest(hand)[x > 1.9] != 0).all()
+    assert_allclose(deform(figure(hand), hand.state.actor.pose)[0][:, 0] - FAR[0], x, atol=1e-9)
+    undo(hand)
+    hand.finish_job()
+    assert (strongest(hand)[x > -0.6] != 0).all()
+    undo(hand, "ctrl shift")
+    assert (strongest(hand)[x < 1.1] == 0).all()
+    assert [edit.text for edit in unsaved_edits(hand.state)] == ["bar: rig"]
+    path = tmp_path / "bar.glb"
+    save_export(hand.state, path)
+    hand.finish_job()
+    assert not unsaved_edits(hand.state)
+    again = viewer.load(path).actors[0].figure
+    assert again.skeleton.names == ("root", "joint", "joint_2")
+    assert_allclose(rest_worlds(again)[:, :3, 3] - FAR, joints(hand), atol=1e-4)
+
+
+def test_symmetric_edits_mirroring_and_removal(drive):
+    hand = opened(drive, bar())
+    editing = hand.state.of(JointEditing)
+    editing.choices.symmetric = True
+    middle = joints(hand)[0]
+    pull(hand, middle, (1.0, 0.0, 0.0))
+    assert_allclose(joints(hand)[0], [0, 0, 0], atol=ATOL)  # stays in the plane x = 0
+    click(hand, 2.0, 0.0, 1.0)
+    assert names(hand) == ("root", "joint_right", "joint_left")  # left is +x of one that faces +z
+    assert_allclose(joints(hand)[1:], [[-2, 0, 0], [2, 0, 0]], atol=2 * ATOL)
+    pull(hand, joints(hand)[1], (-3.0, 0.25, 0.0))
+    assert_allclose(joints(hand)[1:], [[-3, 0.25, 0], [3, 0.25, 0]], atol=2 * ATOL)
+    editing.choices.symmetric = False
+    hand.state.selected_joint = 2
+    click(hand, 3.7, 0.0, 1.0)
+    hand.state.selected_joint = 2
+    hand.key("m")
+    hand.finish_job()
+    assert names(hand)[1:] == ("joint_right", "joint_left", "joint_2_left", "joint_2_right")
+    assert figure(hand).skeleton.parents.tolist() == [-1, 0, 0, 2, 1]
+    assert_allclose(joints(hand)[4], joints(hand)[3] * [-1, 1, 1], atol=2 * ATOL)
+    before = figure(hand)
+    hand.state.selected_joint = 2
+    hand.key("delete")
+    hand.finish_job()
+    assert figure(hand).skeleton.parents.tolist() == [-1, 0, 0, 1]
+    undo(hand)
+    assert figure(hand) is before
+    hand.state.selected_joint = 0
+    hand.key("delete")
+    assert hand.says("root is a root with 2 joints below it")
+    steps = hand.undo_steps
+    hand.click(seen(hand, 0.0, 1.5, 0.0))
+    assert hand.says("click on the mesh") and hand.undo_steps == steps
+
+
+def test_cancelled_binding_and_drags_leave_the_figure(drive, monkeypatch):
+    hand = opened(drive, bar())
+    editing, before = hand.state.of(JointEditing), figure(hand)
+    start = seen(hand, *joints(hand)[0])
+    hand.move(start)
+    hand.press()
+    hand.move((start[0] + 40, start[1]))
+    hand.key("escape")
+    hand.let_go()
+    hand.step(2)
+    assert figure(hand) is before and hand.says("Drag cancelled")
+    gate = threading.Event()
+
+    def waiting(*arguments):
+        while not gate.wait(0.005):
+            report(1, 2)  # raises once the job is cancelled
+        return transfer(*arguments)
+
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.transfer", waiting)
+    hand.click(seen(hand, 2.0, 0.0, 1.0))
+    hand.step(2)
+    assert hand.state.job is not None
+    hand.key("escape")
+    hand.finish_job()
+    gate.set()
+    assert figure(hand) in editing.stale and editing.refused is figure(hand)
+    assert not hand.state.job and (figure(hand).skin.joints == 0).all()
+    hand.step()
+    hand.click("Bind now")
+    hand.step()
+    hand.finish_job()
+    assert (figure(hand).skin.joints == 1).any()
+    hand.key("escape")
+    assert not editing.is_on
+    undo(hand)
+    undo(hand)
+    assert figure(hand).skeleton is None and hand.state.actor.pose is None
+
+
+def test_own_joints_of_a_bound_figure_keep_their_weights(drive):
+    template = arm()
+    shown = deform(template, rest_pose(template.skeleton))[0]
+    other = Figure("other", joined(box([2.0, 0.0, -1.0], [3.0, 2.0, 1.0], (2, 2, 2))))
+    hand = opened(drive, template, other, start="own")
+    editing = hand.state.of(JointEditing)
+    editing.choices.weights = "keep"
+    frame, center = view_frame(hand.state), rest_worlds(template)[1, :3, 3]
+    goal = center + np.array([0.0, 0.4, 0.0])
+    hand.pull(frame.place(center), frame.place(goal))
+    hand.step(2)
+    moved = figure(hand)
+    assert not hand.state.job
+    assert_allclose(rest_worlds(moved)[1, :3, 3], goal, atol=2e-3)
+    assert (moved.skin.weights == template.skin.weights).all()
+    assert_allclose(deform(moved, hand.state.actor.pose)[0], shown, atol=1e-9)
+    hand.state.actor.pose.dofs[-1] = 0.5
+    hand.step(2)
+    assert not editing.is_on and hand.says("Edit skeleton is off")
+    assert hand.state.scene.actors[1].figure is other
+
+
+def test_figure_without_a_mesh_has_nothing_to_edit(drive):
+    hand = opened(drive, Figure("joints", skeleton=arm().skeleton), start="own")
+    assert not hand.state.of(JointEditing).is_on and hand.state.job is None
