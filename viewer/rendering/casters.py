@@ -77,6 +77,20 @@ class Casters:
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
 
+    def state(self) -> list[object]:
+        """Return what decides about the drawn shapes, apart from the options, to compare."""
+        found: list[object] = [self.lineup]
+        for group, instances in self.meshes.instanced:
+            found += [group, instances, instances.n_updates, group.crowd.placement_version]
+        for _, mesh in self.meshes.singles:
+            found += [mesh, mesh.n_updates]
+        for actor in self.lineup.alone:
+            pose = actor.pose
+            found += [placement_of(actor, self.options).tobytes(), pose and pose.skinning_key]
+        if self.lineup.points:
+            found.append(object())  # their size depends on the camera: always different
+        return found
+
     def _blocks(self, actor: Actor) -> bool:
         """Return whether an actor is opaque enough to block light in this pass."""
         return self.options.opacity * actor.opacity > self.threshold

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -42,6 +43,9 @@ class Lighting:
         self._spheres: Floats | None = None
         self._contact: ContactShadows | None = None
         self._size = 0.0  # size of the largest figure, scene units
+        # What was drawn into the maps, which are drawn again only if it differs.
+        self._begun: tuple[object, ...] = ()
+        self._drawn: tuple[tuple[object, ...], Shadow] | None = None
         self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None
         self._owner = Owner()
@@ -60,6 +64,14 @@ class Lighting:
 
     def begin(self, casters: Casters, up: Up, box: Floats) -> None:
         """Draw the maps shared by all passes; the box, (2, 3), stands on the ground."""
+        state = casters.state(), copy(casters.options), up, box.tobytes()
+        if state == self._begun:
+            return
+        self._begun, self._drawn = (), None
+        self._begin(casters, up, box)
+        self._begun = state
+
+    def _begin(self, casters: Casters, up: Up, box: Floats) -> None:
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
         if options.quality == "draft":
@@ -90,9 +102,12 @@ class Lighting:
         casters = replace(casters, threshold=sample.threshold)
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
-            shadow = self._shadow_pass(size).draw(
-                casters.draw, self._spheres, direction, SHADOW_STRENGTH * strength
-            )
+            shadows = self._shadow_pass(size)
+            key = shadows, direction.tobytes(), sample.threshold
+            if self._drawn is None or self._drawn[0] != key:
+                self._drawn = None
+                self._drawn = key, shadows.draw(casters.draw, self._spheres, direction)
+            shadow = replace(self._drawn[1], strength=SHADOW_STRENGTH * strength)
             # The shadows of different passes are offset on the ground and must overlap.
             blur = _BLUR * casters.largest_mesh() if n_passes(options) > 1 else 0.0
             shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)

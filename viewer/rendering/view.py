@@ -38,7 +38,7 @@ class Shadow:
     """(4, 4). Maps scene space to coordinates in the map, 0 to 1 on all axes."""
     texel: float
     """Side of a texel, scene units."""
-    strength: float
+    strength: float = 1.0
     """Fraction of the light that a shadow removes, 0 to 1."""
     angle: float = 0.0
     """Rotation of the filter's pattern, radians."""

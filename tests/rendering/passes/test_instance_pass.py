@@ -373,11 +373,10 @@ def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, qu
     size, options, draws = (64, 48), DisplayOptions(quality=quality), {}
     for count in (10, 250):
         scene = crowd(count)
-        box = scene_box(scene)
-        for turn in range(3):  # the second image of a size stores its background
+        box, camera = scene_box(scene), default_camera(scene, size)
+        for _ in range(3):  # the second image of a size stores its background
             work.clear()
-            camera = default_camera(scene, size)
-            camera.azimuth += 10.0 * turn
+            camera.azimuth += 10.0
             offscreen.render(scene, size, camera, options, box)
         assert work["transform"] == work["write"] == 0
         draws[count] = work["render"]
@@ -405,6 +404,68 @@ def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
     done = draw("normal")
     assert (done.get("transform", 0), done["write"]) == (0, 100 * 18 * 4)
     assert draw("final").get("write", 0) == 0
+
+
+def crowd_and_one() -> Scene:
+    """Return a crowd, and an actor of another figure behind it."""
+    scene, one = crowd(FEWEST), bent(arm(4), (1, "z", 0.3))
+    one.placement[:3, 3] = 4.0, 0.0, -4.0
+    scene.actors.append(one)
+    return scene
+
+
+def test_shadows_of_still_actors_are_not_drawn_again(offscreen, work):
+    scene, size, options = crowd_and_one(), (64, 48), DisplayOptions(quality="normal")
+    camera, box = default_camera(scene, size), scene_box(scene)
+
+    def draws() -> int:
+        work.clear()
+        offscreen.render(scene, size, camera, options, box)
+        return work["render"]
+
+    for _ in range(3):  # the second image of a size stores its background
+        draws()
+    scene.actors[0].pose.dofs[3] += 0.1
+    moved = draws()
+    # The shadow map has one draw for the crowd and one for the other actor; the contact shadows
+    # have two more, which blur them.
+    assert draws() == moved - 2 - 4
+    camera.azimuth += 10.0  # the light follows the camera
+    assert draws() == moved - 4
+    options.lights.follow_camera = False
+    draws()
+    camera.azimuth += 10.0
+    assert draws() == moved - 2 - 4
+
+
+def test_shadows_follow_every_change(offscreen):
+    scene, size, options = crowd_and_one(), (64, 48), DisplayOptions(quality="normal")
+    other, camera, box = rows_of_arms(2), default_camera(scene, size), scene_box(scene)
+    member, one = scene.actors[2], scene.actors[-1]
+
+    def drawn(of: Scene) -> np.ndarray:
+        return offscreen.render(of, size, camera, options, box)
+
+    before = drawn(scene)
+    for actor in (member, one):
+        for change in (
+            lambda pose: pose.dofs.__setitem__(3, pose.dofs[3] + 0.7),
+            lambda pose: pose.figure_translation.__setitem__(0, 1.0),
+            lambda pose: setattr(pose, "figure_scale", 1.5),
+        ):
+            change(actor.pose)
+            after = drawn(scene)
+            drawn(other)  # nothing is left of the first scene
+            np.testing.assert_array_equal(after, drawn(scene))
+            assert (after != before).any()
+            before = after
+    for actor in (member, one):
+        actor.placement[1, 3] += 1.0
+        after = drawn(scene)
+        drawn(other)
+        np.testing.assert_array_equal(after, drawn(scene))
+        assert (after != before).any()
+        before = after
 
 
 def test_groups_that_exceed_a_storage_buffer_are_split(offscreen, monkeypatch):

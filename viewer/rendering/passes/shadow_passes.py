@@ -62,16 +62,15 @@ class ShadowPass:
         draw: Callable[[View, str], object],
         spheres: Floats,
         direction: Floats,
-        strength: float,
     ) -> Shadow:
         """Draw the shadow map of spheres (N, 4), centre and radius, around the casters.
 
-        ``direction``: unit, towards the light. ``strength``: fraction of the light that is removed.
+        ``direction``: unit, towards the light.
         """
         view, extent = light_view(spheres, direction, self.side)
         _draw_depths(self._framebuffer, draw, view)
         matrix = _TO_TEXTURE @ view.projection @ view.matrix
-        return Shadow(self._texture, matrix, 2.0 * extent / self.side, strength)
+        return Shadow(self._texture, matrix, 2.0 * extent / self.side)
 
     def release(self) -> None:
         """Free the map."""
