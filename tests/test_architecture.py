@@ -123,6 +123,7 @@ HOMES = {
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
     "pebble": {"batching/engines/processes.py"},
+    "anywidget": {"notebook_widget.py"},
 }
 
 

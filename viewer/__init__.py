@@ -9,7 +9,7 @@
 >>> viewer.render(scene, size=(320, 240)).shape            # (H, W, 4) uint8
 (240, 320, 4)
 
-Open and show      load, show, render, video
+Open and show      load, show, render, video, widget (in notebooks)
 Arrays             Actor.vertices, .joints, .at, motion, deform, deform_frames, joint_matrices
 Your own arrays    figure, animate
 Files              export, write
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from viewer.formats import write
     from viewer.loading import load
     from viewer.loading.own_arrays import animate, figure
+    from viewer.notebook_widget import widget
     from viewer.rendering.camera import Camera
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rigs.blendshapes import BlendShapes
@@ -118,6 +119,7 @@ __all__ = [
     "shaped",
     "show",
     "video",
+    "widget",
     "with_rest_mesh",
     "write",
 ]
@@ -173,6 +175,7 @@ _HOMES = {
     "shaped": "rigs.shape",
     "show": "app.window",
     "video": "commands._pictures",
+    "widget": "notebook_widget",
     "with_rest_mesh": "rigs.shape",
     "write": "formats",
 }
@@ -185,9 +188,9 @@ def __getattr__(name: str) -> "Any":
     from sys import modules
 
     if "IPython" in modules:
-        from viewer.notebook import show_pictures
+        from viewer.notebook import show_scenes
 
-        show_pictures()
+        show_scenes()
     value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value

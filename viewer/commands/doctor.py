@@ -47,6 +47,7 @@ _EXTRAS = {
     "ufbx": "reading .fbx files",
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
+    "anywidget": "viewer.widget in notebooks",
     "isal": "faster PNG encoding",
     "pebble": "worker processes of viewer batch",
     "dask": "viewer batch on clusters",

@@ -61,7 +61,7 @@ from viewer.rigs.srgb import decode_srgb
 _FOLDER = Path(__file__).resolve().parent
 _SCRIPTS = (
     *("decode", "joints", "tracks", "drawing", "figure", "ground", "camera"),
-    *("panels", "page"),
+    *("panels", "messages", "page"),
 )
 _SEEN = 9  # frames that the camera frames, at most
 _POSTER = (800, 450)

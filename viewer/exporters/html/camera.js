@@ -24,6 +24,14 @@ class Camera {
     return distances[low] + part * (distances[low + 1] - distances[low]);
   }
 
+  // Moves to angles, a distance and a target, of which some may be given.
+  place({ azimuth, inclination, distance, target }, aspect) {
+    if (Number.isFinite(azimuth)) this.azimuth = azimuth;
+    if (Number.isFinite(inclination)) this.inclination = inclination;
+    if (distance > 0) this.factor = distance / this.fitted(aspect);
+    if (Array.isArray(target) && target.length === 3 && target.every(Number.isFinite)) this.target = [...target];
+  }
+
   // Right, up and backward in scene space.
   get axes() {
     const a = this.azimuth * RADIANS, i = this.inclination * RADIANS;

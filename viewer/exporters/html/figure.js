@@ -172,12 +172,21 @@ class Figure {
   // Displaces the rest vertices, and computes or displaces the rest normals, as shape.py does.
   deformRest() {
     const gl = this.gl, tracks = this.tracks, { fields, normalFields } = tracks.arrays;
-    if (!fields && !normalFields) return;
+    const { held } = tracks;
+    if (!fields && !normalFields && !held && !this.wasHeld) return;
+    this.wasHeld = Boolean(held);
     const write = (buffer, values) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, values);
     };
-    const weights = fields ? tracks.at("weights") : [], n = this.data.motion.nShapes;
+    if (held) {
+      const rest = this.split(held.rest?.values ?? this.rest, 3);
+      const normals = this.split(held.restNormals?.values ?? this.restNormals, 3);
+      if (!this.isAttached) return write(this.posed, this.rows(rest, normals));
+      write(this.positions, rest);
+      return write(this.normals, normals);
+    }
+    const weights = fields ? tracks.at("weights") : [], n = this.data.motion.nShapes ?? 0;
     let rest = addOffsets(this.rest, weights, fields, 0, n), normals = this.restNormals;
     if (tracks.isRecomputed) normals = surfaceNormals(rest, this.triangles, this.sources);
     else if (normalFields)
@@ -186,7 +195,7 @@ class Figure {
     normals = this.split(normals, 3);
     if (!this.isAttached) return write(this.posed, this.rows(rest, normals));
     write(this.positions, rest);
-    if (tracks.arrays.recomputed || normalFields) write(this.normals, normals);
+    write(this.normals, normals);
   }
 
   skin(palette) {

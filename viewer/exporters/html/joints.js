@@ -17,6 +17,9 @@ class JointEdits {
 
   reset() { this.changed.clear(); }
 
+  // The changed angles, by the row of the figure's table of DOFs.
+  byRow() { return [...this.changed].map(([dof, angle]) => [this.dofs.rows[dof], angle]); }
+
   // Sets the world rotations of a pose from those of the skinning matrices, four numbers a joint.
   read(turns) {
     this.worlds = this.binds.map((bind, j) => turned(turns.subarray(4 * j, 4 * j + 4), bind));

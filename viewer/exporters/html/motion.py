@@ -39,6 +39,7 @@ _EQUAL = 1e-9  # relative difference of lengths that counts as none
 _NORMAL_TOLERANCE = 2e-3  # of unit normals: 0.1 degrees
 _COARSEST_WEIGHT = 0.01
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
+_RIGID = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])  # stretch of a joint that does not scale
 _EVEN = 1e-4  # relative difference of scales, beyond the rounding of single-precision files
 _SCALE_STEP = 1e-7  # largest step of the scale of the whole figure
 
@@ -240,8 +241,7 @@ def pack_tracks(tracks: Tracks, packer: Packer) -> Json:
         step = np.clip(ratio, _FINEST, _COARSE)
         motion["rotations"] = packer.add(tracks.rotations, np.repeat(step, 4))
         motion["places"] = packer.add(tracks.places, fine)
-        rigid = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
-        if np.abs(tracks.stretches - rigid).max() > _EQUAL:
+        if np.abs(tracks.stretches - _RIGID).max() > _EQUAL:
             motion["stretches"] = packer.add(tracks.stretches, np.repeat(step, 6))
     n_joints = tracks.joints.shape[1]
     is_bound = tracks.joints.shape == tracks.places.shape
@@ -285,9 +285,32 @@ def pack_dofs(tracks: Tracks, pose: Pose | None, packer: Packer) -> Json:
         "dofs": {
             "joints": joints[used].tolist(),
             "axes": axes[used].tolist(),
+            "rows": rows[used].tolist(),
             "limits": limits.tolist(),
         },
     }
+
+
+def pose_values(figure: Figure, pose: Pose, how: Skinning, center: Floats) -> dict[str, Floats]:
+    """Return the values of a pose that a page holds until its time changes; see ``tracks.js``.
+
+    ``center`` (3,) is that of the page's mesh, to which rest vertices are relative.
+    """
+    tracks = tracks_of(figure, [pose], how)
+    found = {"model": tracks.model[0], "joints": tracks.joints[0]}
+    if tracks.rest.skin is not None and tracks.rotations.size:
+        found |= {
+            "rotations": tracks.rotations[0],
+            "places": tracks.places[0],
+            "binds": bind_positions(tracks.rest.skin),
+        }
+        if np.abs(tracks.stretches[0] - _RIGID).max() > _EQUAL:
+            found["stretches"] = tracks.stretches[0]
+    changes_rest = figure.blend_shapes is not None or figure.correctives is not None
+    if tracks.surface is not None and changes_rest:
+        found["rest"] = tracks.rest.require_mesh().positions + tracks.surface.mean - center
+        found["restNormals"] = tracks.surface.normals
+    return {name: values.reshape(-1) for name, values in found.items()}
 
 
 def _pack_surface(surface: RestSurface, fine: float, packer: Packer, motion: Json) -> None:

@@ -24,6 +24,7 @@ class Page {
     if (header.wipes) this.figures.forEach((each, i) => this.setSide(each, i ? "right" : "left"));
     this.panels.choose();
     this.panels.readAddress();
+    this.messages = new Messages(this);
     this.change();
   }
 
@@ -70,6 +71,7 @@ class Page {
 
   play(starts) {
     if (this.end === 0) return;
+    if (starts) this.release();
     if (starts && this.time >= this.end) this.time = 0;
     this.isPlaying = starts;
     this.last = null;
@@ -77,9 +79,15 @@ class Page {
     this.change();
   }
 
+  release() {
+    for (const { tracks } of this.figures) tracks.held = null;
+    this.repose();
+  }
+
+  // Moves to a time; poses that were set from outside end.
   seek(time) {
+    this.release();
     this.time = Math.min(Math.max(time, 0), this.end);
-    this.change();
   }
 
   // Poses again, for changed joints.
@@ -137,6 +145,7 @@ class Page {
     }
     canvas.classList.add("ready");
     element("poster")?.remove();
+    this.messages.send();
   }
 
   // Draws some figures in the columns of the image from one to another.

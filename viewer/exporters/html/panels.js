@@ -46,6 +46,15 @@ class Panels {
     this.showDofs();
   }
 
+  // Chooses a figure, and shows the weights of a joint, or its materials for -1.
+  select(figure, joint = -1) {
+    if (!this.page.figures[figure]) return;
+    element("figure").value = figure;
+    const count = this.chosen.data.joints?.names.length || 0;
+    this.chosen.showWeights(Number.isInteger(joint) && joint < count ? joint : -1);
+    this.choose();
+  }
+
   connectJoints() {
     element("bent").addEventListener("change", () => this.showDofs());
     element("joints").addEventListener("toggle", () => this.update());

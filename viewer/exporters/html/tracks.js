@@ -16,6 +16,19 @@ class Tracks {
   // Seconds from the start of the page's timeline to the last frame.
   get end() { return this.motion.start + (this.motion.n - 1) / this.motion.rate; }
 
+  // Keeps a pose that was set from outside, arrays by name, until the time changes.
+  hold(values) {
+    this.held = {};
+    for (const [name, array] of Object.entries(values))
+      this.held[name] = { rows: 1, columns: array.length, values: Float64Array.from(array) };
+    this.edits?.reset();
+  }
+
+  // A track by its name, of the held pose or the motion.
+  track(name) { return this.held?.[name] ?? (this.held && name === "stretches" ? undefined : this.arrays[name]); }
+
+  get binds() { return this.held?.binds?.values ?? this.skin.binds; }
+
   // Moves to a time in seconds.
   seek(time) {
     const asked = (time - this.motion.start) * this.motion.rate;
@@ -36,11 +49,11 @@ class Tracks {
   }
 
   // Values of a track at the current time.
-  at(name) { return this.between(this.arrays[name]); }
+  at(name) { return this.between(this.track(name)); }
 
-  between({ columns, values }) {
+  between({ rows, columns, values }) {
     const found = new Float64Array(columns);
-    const first = this.frame * columns, part = this.part;
+    const first = Math.min(this.frame, rows - 1) * columns, part = rows > 1 ? this.part : 0;
     for (let c = 0; c < columns; ++c) {
       const low = values[first + c];
       found[c] = part === 0 ? low : low + part * (values[first + columns + c] - low);
@@ -50,10 +63,10 @@ class Tracks {
 
   // Places of the skeleton's joints, figure space.
   joints() {
-    const { joints, places } = this.arrays, found = this.between(joints || places);
+    const places = this.track("places"), found = this.between(this.track("joints") || places);
     if (this.edits?.changed.size) {
       this.edits.read(this.unitTurns());
-      moveAll(this.edits.motions(places ? this.at("places") : found), found);
+      moveAll(this.edits.motions(this.between(places)), found);
     }
     return found;
   }
@@ -75,8 +88,8 @@ class Tracks {
       motions.forEach(({ turn }, j) =>
         turns.set(turned(turn, turns.subarray(4 * j, 4 * j + 4)), 4 * j));
     }
-    const stretches = this.arrays.stretches && this.at("stretches");
-    const { binds, fractions } = this.skin, n = fractions.length;
+    const stretches = this.track("stretches") && this.at("stretches");
+    const { fractions } = this.skin, { binds } = this, n = fractions.length;
     const linear = new Float64Array(9 * n), moved = new Float64Array(3 * n);
     const rotations = new Float64Array(9 * n), center = [0, 0, 0];
     let total = 0, orientation = 0;
@@ -117,7 +130,7 @@ class Tracks {
     for (let j = 0; j < palette.n; ++j) {
       const at = 20 * j, bind = [], place = [];
       for (let axis = 0; axis < 3; ++axis) {
-        bind.push(this.skin.binds[3 * j + axis] - palette.restCenter[axis]);
+        bind.push(this.binds[3 * j + axis] - palette.restCenter[axis]);
         place.push(palette.places[3 * j + axis] - palette.center[axis]);
       }
       const R = palette.rotations.subarray(9 * j, 9 * j + 9);

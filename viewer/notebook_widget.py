@@ -1,0 +1,175 @@
+"""Widget that shows a scene in a notebook, and follows its poses; needs the package anywidget."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import ViewerError
+from viewer.notebook import page_of, picture
+from viewer.rigs.arrays import Floats
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, Scene, scene_of
+from viewer.rigs.skeleton import find_joint
+from viewer.rigs.skinning import Skinning
+
+try:
+    import anywidget
+    import traitlets
+except ModuleNotFoundError as missing:
+    raise ViewerError(
+        "viewer.widget: expected the package anywidget, found none: "
+        "pip install 'skinning-viewer[notebook]'"
+    ) from missing
+
+
+class SceneWidget(anywidget.AnyWidget):
+    """A scene in a notebook; ``widget["name"].pose = pose`` shows a pose at once."""
+
+    _esm = Path(__file__).with_suffix(".js")
+    height = traitlets.Int(420).tag(sync=True)
+    """Pixels."""
+    time = traitlets.Float(0.0).tag(sync=True)
+    """Seconds; setting it ends poses that were set."""
+    camera = traitlets.Dict().tag(sync=True)
+    """``azimuth`` and ``inclination`` in degrees, ``distance`` and ``target`` in scene units; some
+    may be set."""
+    _page = traitlets.Unicode().tag(sync=True)
+    _selection = traitlets.List(traitlets.Int()).tag(sync=True)
+    _poses = traitlets.Dict().tag(sync=True)
+    _angles = traitlets.List(traitlets.Any()).tag(sync=True)
+
+    def __init__(self, scene: Scene, skinning: Skinning | None = None, height: int = 420) -> None:
+        self._scene, self._skinning = scene, skinning or Skinning()
+        self._shown = [actor for actor in scene.actors if actor.is_present]
+        page = page_of(scene)
+        self._centers = _centers(page)
+        super().__init__(_page=page, height=height)
+        self.observe(self._bend, names="_angles")
+
+    def __getitem__(self, name: str) -> ShownActor:
+        """Return the handle of the first actor of this name."""
+        return ShownActor(self, self._shown.index(self._scene[name]))
+
+    @property
+    def selection(self) -> tuple[str, ...]:
+        """The names of the chosen actor and of the joint whose weights are shown, if any."""
+        if not self._selection:
+            return ()
+        index, joint = self._selection
+        figure = self._shown[index].figure
+        bones = () if figure.skeleton is None or joint < 0 else (figure.skeleton.names[joint],)
+        return self._shown[index].name, *bones
+
+    @selection.setter
+    def selection(self, names: Sequence[str]) -> None:
+        if not 1 <= len(names) <= 2:
+            raise ViewerError(f"selection: expected an actor and a joint, found {len(names)} names")
+        actor = self._scene[names[0]]
+        joint = -1
+        if len(names) == 2:
+            joint = find_joint(actor.figure.require_skeleton(), names[1])
+        self._selection = [self._shown.index(actor), joint]
+
+    def update(self) -> None:
+        """Show the current poses of all actors, which may have been changed in place."""
+        found = {}
+        for index, actor in enumerate(self._shown):
+            if actor.pose is not None:
+                found[str(index)] = self._values(index, actor.pose)
+        self._poses = found
+
+    def _show(self, index: int) -> None:
+        pose = self._shown[index].pose
+        assert pose is not None  # it has just been set
+        self._poses = {**self._poses, str(index): self._values(index, pose)}
+
+    def _values(self, index: int, pose: Pose) -> dict[str, bytes]:
+        from viewer.exporters.html.motion import pose_values
+
+        actor = self._shown[index]
+        values = pose_values(actor.figure, pose, self._skinning, self._centers[index])
+        return {name: np.asarray(array, "<f8").tobytes() for name, array in values.items()}
+
+    def _bend(self, change: Mapping[str, Any]) -> None:
+        """Set the angles that sliders of the page have changed."""
+        for actor, pairs in zip(self._shown, change["new"], strict=False):
+            if actor.pose is not None:
+                for row, angle in pairs:
+                    actor.pose.dofs[row] = angle
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """Return the widget, and a picture for where widgets are not shown, as on GitHub."""
+        found = super()._repr_mimebundle_(**options)
+        if found is None:
+            return None
+        data, metadata = found if isinstance(found, tuple) else (found, {})
+        return {**data, "image/png": picture(self._scene)}, metadata
+
+
+class ShownActor:
+    """An actor of a widget's scene; setting its pose shows it."""
+
+    def __init__(self, widget: SceneWidget, index: int) -> None:
+        self._widget, self._index = widget, index
+
+    @property
+    def actor(self) -> Actor:
+        """The actor of the scene."""
+        return self._widget._shown[self._index]
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose that is shown, with the joints that sliders have rotated."""
+        return self.actor.pose
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        self.actor.pose = pose
+        self._widget._show(self._index)
+
+    def __setitem__(self, joint: str, rotation: Sequence[float]) -> None:
+        """Rotate a joint as ``Actor`` does, and show it."""
+        self.actor[joint] = rotation
+        self._widget._show(self._index)
+
+
+def _centers(page: str) -> list[Floats]:
+    """Return the centres (3,) of the meshes of a page, to which their vertices are relative."""
+    found = re.search(r'id="header">(.*?)</script>', page, re.DOTALL)
+    assert found is not None  # every page has a header
+    meshes = [figure.get("mesh") or {} for figure in json.loads(found[1])["figures"]]
+    return [np.array(mesh.get("center", [0.0, 0.0, 0.0])) for mesh in meshes]
+
+
+def widget(
+    scene: Scene | Actor, skinning: Skinning | None = None, *, height: int = 420
+) -> SceneWidget:
+    """Show a scene in a notebook, and follow its poses, its time, its camera and its selection.
+
+    Parameters
+    ----------
+    scene : Scene or Actor
+        What is shown, with its motions.
+    skinning : Skinning, optional
+        Skinning method and options.
+    height : int
+        Height of the view, pixels.
+
+    Returns
+    -------
+    SceneWidget
+        The widget, as the last expression of a cell. ``widget["name"].pose = pose`` shows a pose
+        at once; ``time``, ``camera`` and ``selection`` can be set and read.
+
+    Raises
+    ------
+    ViewerError
+        If the package anywidget is not installed.
+    """
+    return SceneWidget(scene_of(scene, "widget"), skinning, height)
