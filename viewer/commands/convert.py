@@ -121,6 +121,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
+    parser.add_argument_group("faults that viewer lint finds").add_argument(
+        "--fix",
+        nargs="?",
+        const="",
+        metavar="CODE,…",
+        help="fix them before writing: all errors and warnings that have a fix, or these codes, "
+        "such as W011,C020; changes and what remains are printed",
+    )
     add_pose_arguments(parser)
     add_skinning_arguments(parser)
 
@@ -146,21 +154,49 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _check_suffix(asked, options, output, arguments.force)
     joint_map = None if arguments.save_joint_map is None else Path(arguments.save_joint_map)
-    notes = convert_streamed(asked, options, output) if joint_map is None else None
+    fixes_nothing = arguments.fix is None
+    is_plain = joint_map is None and fixes_nothing
+    notes = convert_streamed(asked, options, output) if is_plain else None
     if notes is None:
         scene = open_scene(asked)
         use_file_method(scene, skinning, stated(Skinning, arguments))
+        fixed = [] if fixes_nothing else _fixed(scene, arguments.fix)
         baked = _bake_springs(asked.motion.springs, asked.frames.fps, scene, output)
         saving = _saving_joint_map(joint_map, asked, scene, output, arguments.force)
         with saving, shown_progress("converting"):
             selection, options, chosen = selected(asked, options, scene, output)
             files = output_files(selection, output, options)
             check_outputs(files, output, inputs_of(asked, scene), arguments.force)
-            notes = [*export(selection, output, options=options), *chosen, *baked]
+            notes = [*export(selection, output, options=options), *chosen, *baked, *fixed]
     for written in notes:
         note_found(written)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
+
+
+def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
+    """Fix what lint finds in a scene; return notes about changes, and about what remains."""
+    from viewer.linting.fixes import FIXES, fix_scene
+
+    codes = [code.strip().upper() for code in text.split(",") if code.strip()]
+    unknown = [code for code in codes if code not in FIXES]
+    if unknown:
+        raise ViewerError(
+            f"--fix: expected codes that can be fixed ({', '.join(sorted(FIXES))}), found "
+            f"{printable(unknown[0], 40)}"
+        )
+    with shown_progress("fixing"):
+        found = fix_scene(scene, codes)
+    if not found.notes and not found.left:
+        return [note("X007.none: nothing to fix")]
+    left = [
+        Diagnostic(
+            "X008.left: {figure}: {code} remains: {message}",
+            values={"figure": one.name, "code": one.code, "message": one.message},
+        )
+        for one in found.left
+    ]
+    return [*found.notes, *left]
 
 
 def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:

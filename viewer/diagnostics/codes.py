@@ -273,5 +273,7 @@ CODES: dict[str, Code] = {
     ),
     "X005": Code("note", "data that is written in a different form", "none if intentional"),
     "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
+    "X007": Code("note", "fault that was fixed", "none if intentional"),
+    "X008": Code("warning", "fault that cannot be fixed", "fix it in the program that made it"),
 }
 """By code, in the order of lists; a code is never reused with a different meaning."""

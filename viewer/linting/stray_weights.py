@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import (
@@ -46,22 +47,46 @@ _OTHER_LIMB = 0.03  # minimum distance of a joint from the middle of what it mov
 _NEARER = 0.35  # maximum distance from the bones of the right joint, relative to the wrong one
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Misplaced:
+    """Influences of joints that are far away."""
+
+    found: Support
+    distances: Floats
+    """(N,): of each influence's vertex from the joint's bones, as fractions of the size."""
+    strays: Indices
+    islands: Indices
+    """Rows of ``found``: of single vertices, and of whole parts of the mesh."""
+    swapped: Indices
+    """(P, 2): joints, each with the one whose vertices it moves, and which moves its own."""
+
+
 def check(subject: Subject) -> Iterator[Finding]:
     """Compare where joints have weights with where they are."""
+    misplaced = misplaced_weights(subject)
+    if misplaced is None:
+        return
+    figure, found = subject.actor.figure, misplaced.found
+    if len(misplaced.swapped):
+        yield _swapped_finding(subject, figure, misplaced.swapped[:, 0])
+    yield from _islands(subject, figure, found, misplaced.islands, misplaced.distances)
+    yield from _strays(subject, figure, found, misplaced.strays, misplaced.distances)
+
+
+def misplaced_weights(subject: Subject) -> _Misplaced | None:
+    """Return the influences of joints that are far away; None if they cannot be judged."""
     figure = subject.actor.figure
     size = subject.size()
     if figure.skin is None or figure.mesh is None or not figure.is_attached or not size > 0.0:
-        return
+        return None
     if subject.lacks("weights", "positions", "bindings", "joints"):
-        return  # places and weights that are missing cannot be compared
+        return None  # places and weights that are missing cannot be compared
     found = support_of(figure)
     if figure.mesh.n_vertices < FEWEST or len(found.vertices) == 0:
-        return
+        return None
     places, parents = bind_positions(figure.skin), figure.require_skeleton().parents
     points = figure.mesh.positions[found.vertices]
     swapped = _swapped(found, points, places, parents, size)
-    if len(swapped):
-        yield _swapped_finding(subject, figure, swapped)
     distances = bone_distances(places, parents, points, found.joints) / size
     largest, reach = np.zeros((2, figure.skin.n_joints))
     np.maximum.at(largest, found.joints, found.weights)
@@ -82,12 +107,10 @@ def check(subject: Subject) -> Iterator[Finding]:
     n_far, n_own = (np.bincount(found.joints[k], minlength=len(reach)) for k in (leaks, mostly))
     stray |= leaks & (n_far > n_own)[found.joints]
     stray |= _are_alone(found, surface, parents) & is_minor & (distances > _NEAR)
-    stray &= ~np.isin(found.joints, swapped) & ~_are_adjacent(found, parents)
-    if not stray.any():
-        return
-    whole = stray & _are_islands(surface, found, parts)
-    yield from _islands(subject, figure, found, np.flatnonzero(whole), distances)
-    yield from _strays(subject, figure, found, np.flatnonzero(stray & ~whole), distances)
+    stray &= ~np.isin(found.joints, swapped[:, 0]) & ~_are_adjacent(found, parents)
+    whole = stray & _are_islands(surface, found, parts) if stray.any() else stray
+    strays, islands = np.flatnonzero(stray & ~whole), np.flatnonzero(whole)
+    return _Misplaced(found, distances, strays, islands, swapped)
 
 
 def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
@@ -227,7 +250,7 @@ def _strays(
 
 
 def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size: float) -> Indices:
-    """Return joints in pairs, each of which moves the vertices around the other: (N,)."""
+    """Return joints, each with one that moves the vertices around it, and conversely: (N, 2)."""
     count = len(places)
     total = np.bincount(found.joints, found.weights, minlength=count)
     sums = [
@@ -246,7 +269,8 @@ def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size
     # Of several joints there, the pair is the nearest one.
     near = [int(across[one][second[first == one]].argmin()) for one in np.unique(first)]
     pairs = {one: second[first == one][k] for one, k in zip(np.unique(first), near, strict=True)}
-    return used[[one for one, other in pairs.items() if pairs.get(other) == one]]
+    mutual = [(one, other) for one, other in pairs.items() if pairs.get(other) == one]
+    return used[np.array(mutual, dtype=np.int64).reshape(-1, 2)]
 
 
 def _swapped_finding(subject: Subject, figure: Figure, joints: Indices) -> Finding:

@@ -1,0 +1,167 @@
+"""Fixes: the fault is gone, what was sound is unchanged, and the note states by how much."""
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+from linting.planted import column, moved, weighted, with_normal
+from linting.test_bad_keys import FRAMES, RATE, K, about_z, arm, waving
+from linting.test_bad_rigs import (
+    NOSE,
+    body,
+    joint,
+    noisy,
+    renamed,
+    stray,
+    stuck_out,
+    swapped,
+    table,
+    turned,
+)
+
+from viewer.cli import run
+from viewer.diagnostics.codes import CODES
+from viewer.exporters import export
+from viewer.linting import (
+    Subject,
+    bindings,
+    lint_files,
+    meshes,
+    noise,
+    spikes,
+    stray_weights,
+    symmetry,
+    weights,
+)
+from viewer.linting.fixes import FIXES, fix_scene
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skin import normalized, owners
+
+
+def fixed(figure, check):
+    """Fix what one check finds in a figure, in up to four rounds; return it and the first note."""
+    subject, notes = Subject(Actor(figure), up=figure.up), []
+    for _ in range(4):
+        found = [one for one in check.check(subject) if one.code in FIXES]
+        for one in found:
+            fix = import_module(f"viewer.linting.fixes.{FIXES[one.code]}").fix
+            notes.append(str(fix(subject, one)))
+    assert not any(one.code in FIXES for one in check.check(subject))
+    return subject.actor.figure, notes[0]
+
+
+def weights_of(figure) -> np.ndarray:
+    skin = normalized(figure.skin)
+    found = np.zeros((skin.n_vertices, skin.n_joints))
+    np.add.at(found, (owners(skin), skin.joints), skin.weights)
+    return found
+
+
+def test_every_code_with_a_fix_exists():
+    assert set(FIXES) <= set(CODES)
+
+
+def test_sums_and_signs_are_corrected():
+    figure, note = fixed(weighted({5: [(0, 0.9)]}), weights)
+    assert weights_of(figure)[5].tolist() == [1.0, 0.0] and "changed by up to 0.1 " in note
+    figure, _ = fixed(weighted({7: [(0, 1.25), (1, -0.25)]}), weights)
+    assert weights_of(figure)[7].tolist() == [1.0, 0.0]
+
+
+def test_vertex_without_weights_gets_those_of_its_neighbours():
+    """Of vertex 11, two are below it, with joint 0, two above, and two on its ring, with both."""
+    figure, _ = fixed(weighted({11: []}), weights)
+    assert weights_of(figure)[11].tolist() == [0.5, 0.5]
+
+
+@pytest.mark.parametrize("amount", [1.0, 0.3])
+def test_stray_weight_goes_to_the_joints_of_its_surroundings(amount):
+    figure, note = fixed(stray(amount)(), stray_weights)
+    found = weights_of(figure)
+    assert found[NOSE, joint("right_foot")] == 0.0
+    assert found[NOSE, joint("head")] == pytest.approx(table()[NOSE, joint("head")], abs=0.05)
+    others = np.arange(len(found)) != NOSE
+    np.testing.assert_allclose(found[others], table()[others], atol=1e-12)
+    assert "weights of 1 vertex" in note
+
+
+def test_exchanged_legs_are_exchanged_back():
+    figure, _ = fixed(swapped(), stray_weights)
+    np.testing.assert_allclose(weights_of(figure), table(), atol=1e-9)
+
+
+def test_noise_is_smoothed_towards_the_weights_before():
+    noise_of_limb = noisy(0.2, "left_shoulder")()
+    figure, _ = fixed(noise_of_limb, noise)
+    errors = [np.linalg.norm(weights_of(one) - table()) for one in (noise_of_limb, figure)]
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_names_and_bindings_are_corrected():
+    figure, note = fixed(renamed(), symmetry)
+    assert figure.skeleton.names == body().skeleton.names and "knee" in note
+    figure, _ = fixed(turned(), bindings)
+    np.testing.assert_allclose(figure.skin.inverse_bind, body().skin.inverse_bind, atol=1e-9)
+
+
+def test_spike_and_normal_are_corrected():
+    """The middle of its neighbours is within 10 mm of where the vertex was."""
+    figure, note = fixed(stuck_out(), spikes)
+    away = np.linalg.norm(figure.mesh.positions[NOSE] - body().mesh.positions[NOSE])
+    assert away < 0.01 and "1 place moved" in note
+    figure, _ = fixed(with_normal(3, (0.0, 0.0, 0.0)), meshes)
+    np.testing.assert_allclose(figure.mesh.normals[3], column().mesh.normals[3], atol=1e-9)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+@pytest.mark.parametrize("is_captured", [False, True])
+def test_pop_is_interpolated(is_captured, frames):
+    """The path without the pop is smooth: interpolation is off by at most its curvature."""
+    figure, bends = arm(), waving()
+    popping = bends.copy()
+    popping[30 : 30 + frames] += 50.0
+    turns = about_z(popping)
+    if is_captured:
+        every = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+        every[:, 3] = turns
+        clip = SampledClip("x", Timing(RATE, K), every, np.zeros((FRAMES, 6, 3)))
+    else:
+        channel = TransformChannel(3, "rotation", K / RATE, turns)
+        clip = TransformClip("x", (channel,), 0.0, (FRAMES - 1) / RATE)
+    scene = Scene([Actor(figure, clip=clip)])
+    (note,) = fix_scene(scene).notes
+    rotations = scene.actors[0].clip.sample(figure.skeleton, K / RATE).rotations
+    rotations = rotations[:, 3 if is_captured else 0]
+    np.testing.assert_allclose(np.abs(np.sum(rotations * about_z(bends), axis=1)), 1.0, atol=1e-4)
+    assert "left_elbow" in str(note)
+
+
+def test_keys_of_scales_are_deleted():
+    scales = TransformChannel(2, "scale", [0.0, 1.0], np.full((2, 3), 1.4))
+    turns = TransformChannel(3, "rotation", K / RATE, about_z(waving()))
+    scene = Scene([Actor(arm(), clip=TransformClip("x", (scales, turns), 0.0, 1.9))])
+    fix_scene(scene)
+    assert [one.path for one in scene.actors[0].clip.channels] == ["rotation"]
+    np.testing.assert_array_equal(scene.actors[0].pose.scales[2], 1.0)
+
+
+def test_convert_fixes_and_prints_changes(tmp_path, capsys):
+    export(Actor(weighted({5: [(0, 0.9)]})), tmp_path / "bad.skel")
+    files = [str(tmp_path / name) for name in ("bad.skel", "bad.skin", "good.skel", "good.skin")]
+    assert run(["convert", *files[:2], "-o", files[2], "--fix"]) == 0
+    assert "W001 fixed: weights of 1 vertex changed by up to 0.1 " in capsys.readouterr().out
+    assert "W001" not in {one.code for one in lint_files(files[2:])[1]}
+    assert run(["convert", *files[2:], "-o", str(tmp_path / "again.skel"), "--fix", "W001"]) == 0
+    assert "nothing to fix" in capsys.readouterr().out
+
+
+def test_what_cannot_be_fixed_is_said(tmp_path, capsys):
+    export(Actor(moved(6, (100.0, 0.0, 0.0))), tmp_path / "bad.skel")
+    command = ["convert", str(tmp_path / "bad.skel"), str(tmp_path / "bad.skin"), "-o"]
+    assert run([*command, str(tmp_path / "x.skel"), "--fix"]) == 0
+    assert "M010 remains" in capsys.readouterr().out
+    assert run([*command, str(tmp_path / "y.skel"), "--fix", "M010"]) == 2
+    assert "--fix: expected codes that can be fixed" in capsys.readouterr().err

@@ -1,0 +1,104 @@
+"""Repair of what lint finds: one module a subject, each fix with what it changed and by how much.
+
+Fixes change neither the number of vertices, triangles and joints nor their order, so that findings
+stay valid while the others are fixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from importlib import import_module
+from typing import Protocol
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import SEVERITIES, Diagnostic
+from viewer.linting._finding import Finding, LintOptions
+from viewer.linting._running import lint_scene
+from viewer.linting._subject import Subject
+from viewer.progress import report
+from viewer.rigs.scene import Scene, pose_actors
+
+_ROUNDS = 8  # smoothing may need several; a fix that changes nothing ends them
+
+FIXES = {
+    "W002": "weights",
+    "W001": "weights",
+    "W009": "weights",
+    "W013": "weights",
+    "W012": "weights",
+    "W011": "weights",
+    "W004": "weights",
+    "W014": "weights",
+    "W015": "weights",
+    "W016": "weights",
+    "B007": "joints",
+    "Y004": "joints",
+    "M002": "meshes",
+    "M003": "meshes",
+    "M007": "meshes",
+    "M008": "meshes",
+    "M013": "meshes",
+    "C020": "motions",
+    "C022": "motions",
+    "C023": "motions",
+}
+"""Modules in this folder with a function ``fix(subject, finding)``, by code, in order of use."""
+
+
+class Fix(Protocol):
+    """Function of a module of fixes."""
+
+    def __call__(self, subject: Subject, finding: Finding) -> Diagnostic | None:
+        """Change ``subject.actor``; return what was changed, or None if nothing can be."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fixed:
+    """Result of fixing a scene."""
+
+    notes: list[Diagnostic]
+    """What was changed, and by how much."""
+    left: list[Finding]
+    """Findings with the requested codes that remain."""
+
+
+def fix_scene(
+    scene: Scene, codes: Collection[str] = (), options: LintOptions | None = None
+) -> Fixed:
+    """Fix what lint finds in a scene, in place: warnings and errors, or all with these codes."""
+    chosen, notes, tried = options or LintOptions(), list[Diagnostic](), set[tuple[int, str]]()
+    for number in range(_ROUNDS):
+        report(number, _ROUNDS, what="fixing")
+        found = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
+        todo = [one for one in found if one.code in FIXES and _key(one) not in tried]
+        todo.sort(key=lambda one: [*FIXES].index(one.code))
+        if not todo:
+            break
+        for finding in todo:
+            assert finding.actor is not None  # findings of checks are about actors
+            subject = Subject(scene.actors[finding.actor], finding.actor, scene.up, chosen)
+            fix: Fix = import_module(f"{__name__}.{FIXES[finding.code]}").fix
+            said = fix(subject, finding)
+            if said is None:
+                tried.add(_key(finding))
+            else:
+                notes.append(said)
+    if scene.time is not None:
+        pose_actors(scene.actors, scene.time)
+    left = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
+    return Fixed(_merged(notes), left)
+
+
+def _key(finding: Finding) -> tuple[int, str]:
+    return finding.actor or 0, f"{finding.diagnostic.key} {finding.animation}"
+
+
+def _is_wanted(finding: Finding, codes: Collection[str]) -> bool:
+    if codes:
+        return finding.code in codes
+    return SEVERITIES.index(finding.severity) > SEVERITIES.index("note")
+
+
+def _merged(notes: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """Return the notes of all rounds, each only once."""
+    return [*{str(one): one for one in notes}.values()]

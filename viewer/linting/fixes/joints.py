@@ -1,0 +1,71 @@
+"""Fixes of joints: names on the wrong side, and rotated bindings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, note
+from viewer.linting._finding import Finding
+from viewer.linting._mirror import name_partners
+from viewer.linting._subject import Subject
+from viewer.phrases import listed
+from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.kinematics import world_matrices
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.skin import moves_vertices
+
+_SAME = np.radians(1.0)  # rotations that are equal up to rounding
+
+
+def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
+    """Replace the names of joints, or their inverse bind matrices; None if neither is possible."""
+    if finding.code == "Y004":
+        return _renamed(subject, finding)
+    return _rebound(subject, finding)
+
+
+def _renamed(subject: Subject, finding: Finding) -> Diagnostic | None:
+    """Exchange the names of joints with those of their counterparts."""
+    figure = subject.actor.figure
+    skeleton = figure.require_skeleton()
+    partners, wrong = name_partners(skeleton), set(finding.joints.tolist())
+    pairs = {(min(j, int(partners[j])), max(j, int(partners[j]))) for j in wrong}
+    if not all(a >= 0 and {a, b} <= wrong for a, b in pairs):
+        return None  # only one of the two is on the wrong side
+    names = [*skeleton.names]
+    for a, b in pairs:
+        names[a], names[b] = names[b], names[a]
+    subject.actor.figure = replace(figure, skeleton=replace(skeleton, names=tuple(names)))
+    return note(
+        "X007.names: {figure}: Y004 fixed: names exchanged with those of the other side: {names}",
+        figure=subject.actor.name,
+        names=listed([skeleton.names[a] for a, _ in sorted(pairs)]),
+    )
+
+
+def _rebound(subject: Subject, finding: Finding) -> Diagnostic | None:
+    """Bind joints so that they move the mesh at rest as most others do."""
+    figure = subject.actor.figure
+    skeleton, skin = figure.require_skeleton(), figure.require_skin()
+    worlds = world_matrices(skeleton, rest_pose(skeleton))
+    others = np.setdiff1d(np.flatnonzero(moves_vertices(skin)), finding.joints)
+    moves = worlds[others] @ skin.inverse_bind[others]
+    turns, _ = nearest_rotations(moves[:, :3, :3])
+    traces = np.einsum("iab,jab->ij", turns, turns)
+    angles = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    usual = int((angles < _SAME).sum(axis=1).argmax())
+    if (angles[usual] < _SAME).sum() < 0.5 * len(others):
+        return None  # bound in another pose: the rotation at rest says nothing
+    joints = finding.joints
+    binds = skin.inverse_bind.copy()
+    binds[joints] = np.linalg.inv(worlds[joints]) @ moves[usual]
+    subject.actor.figure = replace(figure, skin=replace(skin, inverse_bind=binds))
+    labels = joint_labels(skeleton)
+    return note(
+        "X007.bindings: {figure}: B007 fixed: bound at rest: {names}",
+        figure=subject.actor.name,
+        names=listed([labels[joint] for joint in joints]),
+    )

@@ -1,0 +1,238 @@
+"""Fixes of weights: sums, signs, strays, exchanged joints, torn seams, noise and hard borders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, note
+from viewer.linting._finding import Finding
+from viewer.linting._mirror import mirror_of
+from viewer.linting._subject import Indices, Subject
+from viewer.linting._surface import Surface, surface_of
+from viewer.linting.stray_weights import misplaced_weights
+from viewer.phrases import counted, rounded
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.skin import (
+    Skin,
+    has_influence,
+    merged,
+    normalized,
+    owners,
+    row_norms,
+    skin_from_entries,
+    skin_rows,
+)
+
+_STEPS = 1  # smoothing steps in one round: more blur what is not noise
+_RINGS = 3  # edges from a hard border within which it is smoothed
+_SMALL = 1e-3  # weights below which smoothing ends, so that influences do not spread everywhere
+_CHANGED = 1e-6  # smallest change of a vertex's weights that counts
+_TOGETHER = 256  # vertices whose distances from others are computed together
+
+
+def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
+    """Replace the skin of the actor's figure; None if nothing changes."""
+    figure = subject.actor.figure
+    old = figure.skin
+    if old is None or figure.mesh is None:
+        return None
+    new = _repaired(subject, old, finding)
+    if new is None:
+        return None
+    changes = row_norms(
+        old.n_vertices,
+        np.concatenate([owners(old), owners(new)]),
+        np.concatenate([old.joints, new.joints]),
+        np.concatenate([old.weights, -new.weights]),
+    )
+    changed = np.flatnonzero(changes > _CHANGED)
+    if len(changed) == 0:
+        return None
+    subject.actor.figure = replace(figure, skin=new)
+    return note(
+        "X007.weights: {figure}: {code} fixed: weights of {n} changed by up to {most} in total "
+        "(vertex {vertex})",
+        figure=subject.actor.name,
+        code=finding.code,
+        n=counted(len(changed), "vertex"),
+        most=rounded(float(changes.max()), 2),
+        vertex=int(changes.argmax()),
+    )
+
+
+def _repaired(subject: Subject, skin: Skin, finding: Finding) -> Skin | None:
+    code, surface = finding.code, surface_of(subject.actor.figure)
+    vertices = finding.vertices.astype(np.int64)
+    if code == "W001":
+        return normalized(skin)
+    if code == "W002":
+        return normalized(replace(skin, weights=np.maximum(skin.weights, 0.0)))
+    if code == "W009":
+        return merged(skin)
+    if code == "W004":
+        return _from_neighbours(subject, skin, surface, vertices)
+    if code == "W014":
+        return _rejoined(skin, surface, vertices)
+    if code == "W016":
+        return _smoothed(_mirrored(subject, skin, surface, vertices), surface, vertices)
+    if code == "W015":
+        if finding.diagnostic.key != "W015.border":
+            return None  # a rig whose parts are all rigid is made so
+        return _smoothed(skin, surface, _around(surface, vertices))
+    misplaced = misplaced_weights(subject)
+    if misplaced is None:
+        return None
+    if code == "W013":
+        other = np.arange(skin.n_joints)
+        other[misplaced.swapped[:, 0]] = misplaced.swapped[:, 1]
+        return replace(skin, joints=other[skin.joints].astype(np.int32))
+    if code == "W012":
+        return _from_nearest(subject, skin, np.unique(misplaced.found.vertices[misplaced.islands]))
+    # Stray weights are removed; what is left is normalised.
+    rows, found = misplaced.strays, misplaced.found
+    keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
+    strays = np.isin(keys, found.vertices[rows] * skin.n_joints + found.joints[rows])
+    kept = replace(skin, weights=np.where(strays, 0.0, skin.weights))
+    bare = np.flatnonzero(~has_influence(kept) & has_influence(skin))
+    return _from_neighbours(subject, normalized(kept), surface, bare)
+
+
+def _from_neighbours(subject: Subject, skin: Skin, surface: Surface, vertices: Indices) -> Skin:
+    """Give vertices the mean weights of their neighbours, or those of the nearest vertex."""
+    given = has_influence(skin)
+    given[vertices] = False
+    wanted = np.zeros(len(surface.place), dtype=np.bool_)
+    wanted[surface.place[vertices]] = True
+    edges = surface.edges[wanted[surface.edges[:, 0]]]
+    edges = edges[given[edges[:, 1]]]
+    if len(edges):
+        rows = skin_rows(skin, edges[:, 1].astype(np.int32))
+        place = edges[owners(rows), 0].astype(np.int64)
+        keys, index = np.unique(place * skin.n_joints + rows.joints, return_inverse=True)
+        sums = np.bincount(index, rows.weights).astype(np.float64, copy=False)
+        places, joints = np.divmod(keys, skin.n_joints)
+        has_some = np.zeros(len(surface.place), dtype=np.bool_)
+        has_some[edges[:, 0]] = True
+        skin = _with_rows(skin, surface, has_some[surface.place], places, joints, sums)
+        vertices = vertices[~has_some[surface.place[vertices]]]
+    return _from_nearest(subject, skin, vertices)
+
+
+def _from_nearest(subject: Subject, skin: Skin, vertices: Indices) -> Skin:
+    """Give vertices the weights of the nearest vertex that has some and is not one of them."""
+    if len(vertices) == 0:
+        return skin
+    points = subject.actor.figure.require_mesh().positions
+    given = has_influence(skin)
+    given[vertices] = False
+    # Vertices at the same positions must not tear: they take the weights of the same vertex.
+    sources, rows = np.flatnonzero(given), np.arange(skin.n_vertices)
+    if len(sources) == 0:
+        return skin
+    for start in range(0, len(vertices), _TOGETHER):
+        some = vertices[start : start + _TOGETHER]
+        squares = (points[sources] ** 2).sum(axis=1) - 2.0 * points[some] @ points[sources].T
+        rows[some] = sources[squares.argmin(axis=1)]
+    return skin_rows(skin, rows.astype(np.int32))
+
+
+def _rejoined(skin: Skin, surface: Surface, vertices: Indices) -> Skin:
+    """Give all vertices at the places of some the mean of their weights."""
+    torn = np.isin(surface.place, surface.place[vertices])
+    where = np.flatnonzero(torn)
+    counts = np.bincount(surface.place[where], minlength=len(surface.place))
+    entries = np.flatnonzero(torn[owners(skin)])
+    place = surface.place[owners(skin)[entries]].astype(np.int64)
+    keys, index = np.unique(place * skin.n_joints + skin.joints[entries], return_inverse=True)
+    places, joints = np.divmod(keys, skin.n_joints)
+    sums = np.bincount(index, skin.weights[entries]).astype(np.float64, copy=False)
+    means = sums / counts[places]
+    return _with_rows(skin, surface, torn, places, joints, means)
+
+
+def _with_rows(
+    skin: Skin, surface: Surface, changed: Bools, places: Indices, joints: Indices, weights: Floats
+) -> Skin:
+    """Replace the weights of vertices (V,) by those of their places, sorted by place."""
+    where = np.flatnonzero(changed)
+    first = np.searchsorted(places, surface.place[where], side="left")
+    counts = np.searchsorted(places, surface.place[where], side="right") - first
+    index = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    kept = ~changed[owners(skin)]
+    found = skin_from_entries(
+        skin.n_vertices,
+        np.concatenate([owners(skin)[kept], np.repeat(where, counts)]),
+        np.concatenate([skin.joints[kept], joints[index]]),
+        np.concatenate([skin.weights[kept], weights[index]]),
+        skin.inverse_bind,
+    )
+    return normalized(replace(found, dqs_fractions=skin.dqs_fractions))
+
+
+def _around(surface: Surface, vertices: Indices) -> Indices:
+    """Return the places within a few edges of some vertices."""
+    near = np.zeros(len(surface.place), dtype=np.bool_)
+    near[surface.place[vertices]] = True
+    for _ in range(_RINGS):
+        near[surface.edges[near[surface.edges[:, 0]], 1]] = True
+    return np.flatnonzero(near)
+
+
+def _mirrored(subject: Subject, skin: Skin, surface: Surface, vertices: Indices) -> Skin:
+    """Average the weights of places with those at the mirrored places of a symmetric mesh."""
+    # Otherwise the noise, smoothed, would remain as a difference of the sides.
+    mirror = mirror_of(subject.actor.figure)
+    if mirror is None:
+        return skin
+    whole = normalized(merged(skin))
+    places = np.unique(surface.place[vertices])
+    places = np.unique(np.concatenate([places, surface.place[mirror.vertices[places]]]))
+    places = places[mirror.known[places]]
+    partners = np.where(mirror.joints >= 0, mirror.joints, np.arange(skin.n_joints))
+    own = skin_rows(whole, places.astype(np.int32))
+    other = skin_rows(whole, mirror.vertices[places].astype(np.int32))
+    keys = np.concatenate(
+        [
+            places[owners(own)] * skin.n_joints + own.joints,
+            places[owners(other)] * skin.n_joints + partners[other.joints],
+        ]
+    )
+    distinct, index = np.unique(keys, return_inverse=True)
+    sums = np.bincount(index, np.concatenate([own.weights, other.weights]))
+    means = 0.5 * sums.astype(np.float64, copy=False)
+    place, joint = np.divmod(distinct, skin.n_joints)
+    moving = np.zeros(len(surface.place), dtype=np.bool_)
+    moving[places] = True
+    return _with_rows(whole, surface, moving[surface.place], place, joint, means)
+
+
+def _smoothed(skin: Skin, surface: Surface, vertices: Indices) -> Skin:
+    """Average the weights of places with those of their neighbours, w <- (w + mean) / 2."""
+    whole = normalized(merged(skin))
+    is_place = np.zeros(len(surface.place), dtype=np.bool_)
+    is_place[surface.place[vertices]] = True
+    moving = is_place[surface.place]
+    edges = surface.edges[is_place[surface.edges[:, 0]]]
+    near = np.unique(np.concatenate([np.flatnonzero(is_place), edges[:, 1]]))
+    first = surface.place[near] == near
+    near = near[first]
+    # Only the joints that move these places need columns.
+    index = np.full(len(surface.place), -1)
+    index[near] = np.arange(len(near))
+    rows = index[owners(whole)]
+    used, column = np.unique(whole.joints[rows >= 0], return_inverse=True)
+    weights = np.zeros((len(near), len(used)))
+    weights[rows[rows >= 0], column] = whole.weights[rows >= 0]
+    start, end = index[edges[:, 0]], index[edges[:, 1]]
+    degree = np.bincount(start, minlength=len(near))
+    inner = np.flatnonzero(degree > 0)
+    for _ in range(_STEPS):
+        sums = np.zeros_like(weights)
+        np.add.at(sums, start, weights[end])
+        weights[inner] = 0.5 * (weights[inner] + sums[inner] / degree[inner, None])
+    weights[weights < _SMALL] = 0.0
+    place, joint = np.nonzero(weights)
+    found = near[place], used[joint].astype(np.int64), weights[place, joint]
+    return _with_rows(whole, surface, moving, *found)
