@@ -31,6 +31,7 @@ EVERYWHERE = {
     "errors",
     "near_names",
     "phrases",
+    "plugins",
     "progress",
     "schemas",
     "version",
@@ -51,6 +52,7 @@ PARTS = {
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts", "media", "resources"},
+    "plugin_template": {"formats", "rigs"},  # otherwise the names of ``viewer.__all__``
     "examples": {
         "batching",
         "models",
@@ -68,6 +70,7 @@ LEAVES = {
     "diagnostics": {"data_classes", "phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
+    "plugins": {"data_classes", "errors", "phrases"},
     "progress": {"interrupts"},
     "schemas": set(),
     "version": set(),

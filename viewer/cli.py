@@ -9,14 +9,14 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
 import viewer
 from viewer.commands import COMMANDS
-from viewer.commands._usage import Parser, check_command, command_parser
+from viewer.commands._usage import Parser, command_module, command_parser, is_plugged_command
 from viewer.errors import FormatError, ViewerError
 from viewer.interrupts import Interrupted, deferred, watched
 from viewer.phrases import printable
+from viewer.plugins import without_plugins
 from viewer.streams import standard_streams
 
 _EPILOG = """\
@@ -79,11 +79,14 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments and arguments[0] == "--version":
         print(f"viewer {viewer.__version__}")
         return 0
+    own = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    if "--no-plugins" in own:
+        arguments.remove("--no-plugins")
+        with without_plugins():
+            return _dispatch(arguments)
     name = "view"
-    if arguments and arguments[0] in COMMANDS:
+    if (arguments and arguments[0] in COMMANDS) or (arguments and is_plugged_command(arguments[0])):
         name = arguments.pop(0)
-    elif arguments:
-        check_command(arguments[0])
     parser = command_parser(name, arguments)
     # Everything after "--" is a file, even if it looks like an option.
     end = arguments.index("--") if "--" in arguments else len(arguments)
@@ -94,7 +97,7 @@ def _dispatch(arguments: list[str]) -> int:
         parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
-    command = import_module(f"viewer.commands.{name}")
+    command = command_module(name)
     if not gc.isenabled():  # suspended at start-up; imported modules are excluded
         gc.freeze()
         gc.enable()
@@ -128,6 +131,9 @@ def _overview() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="store_true", help="print the version")
+    parser.add_argument(
+        "--no-plugins", action="store_true", help="ignore installed plug-ins, for any command"
+    )
     group = parser.add_argument_group("commands")
     for name, text in COMMANDS.items():
         # Commands are added like arguments, so that argparse aligns them.

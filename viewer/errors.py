@@ -6,6 +6,7 @@
     ├── FormatError             exit 2   an invalid file: path:line: expected …, found …
     ├── UnsupportedFormatError  exit 2   no reader or writer for this kind of file
     ├── RigError                exit 2   incompatible parts of a figure, or an unknown name
+    ├── PluginError             exit 2   a plug-in failed; the message names its package
     ├── RenderError             exit 4   no usable OpenGL, or a driver error
     └── OutputError             exit 5   a result could not be written
 """
@@ -22,6 +23,7 @@ from viewer.phrases import printable
 __all__ = [
     "FormatError",
     "OutputError",
+    "PluginError",
     "RenderError",
     "RigError",
     "UnsupportedFormatError",
@@ -97,6 +99,10 @@ class RigError(ViewerError):
     """Parts of a figure are incompatible, or there is no part with a given name."""
 
     is_shortened = True
+
+
+class PluginError(ViewerError):
+    """A plug-in cannot be imported, or raised an exception; its package is named."""
 
 
 class RenderError(ViewerError):

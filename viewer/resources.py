@@ -10,7 +10,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource(kind: str, *parts: str) -> Path:
-    """Return the path of a file that ships in "shaders", "assets", "manual" or "examples"."""
+    """Return the path of a file that ships in one of its folders, such as "shaders"."""
     # The folders are inside the package in a wheel, and next to it in a checkout.
     for base in (_PACKAGE, _PACKAGE.parent):
         path = base.joinpath(kind, *parts)

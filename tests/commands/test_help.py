@@ -4,7 +4,6 @@ import argparse
 import io
 import re
 import sys
-from importlib import import_module
 
 import pytest
 
@@ -12,13 +11,14 @@ from viewer.cli import run
 from viewer.commands import COMMANDS, _progress
 from viewer.commands._printing import print_line, table_lines
 from viewer.commands._progress import Progress, shown_progress
+from viewer.commands._usage import command_module
 from viewer.manual import PAGES, page_text
 from viewer.progress import report
 
 
 def parser_of(command: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=f"viewer {command}")
-    import_module(f"viewer.commands.{command}").add_arguments(parser)
+    command_module(command).add_arguments(parser)
     return parser
 
 
@@ -38,8 +38,8 @@ def test_every_option_is_documented(command):
         ),
         (
             "convert",
-            "files, output, writing motions, writing VRM characters, frames, captures and BVH, "
-            "clean-up, shape and pose, skinning",
+            "files, output, writing motions, writing VRM characters, writing HTML pages, frames, "
+            "captures and BVH, clean-up, shape and pose, skinning",
         ),
         (
             "view",
@@ -68,6 +68,7 @@ USAGES = {
     "diff": "REFERENCE OTHER ... [options]",
     "lint": "FILES ... [options]",
     "models": "[list | names | add NAME] [options]",
+    "new-plugin": "NAME [-o FOLDER]",
     "doctor": "[--bench]",
     "help": "[TOPIC | COMMAND | examples [NAME]]",
     "completion": "bash|zsh|tcsh|fish",

@@ -106,9 +106,8 @@ def shading() -> str:
 
 
 def commands() -> str:
-    return table(
-        ("command", "purpose"), [(f"`viewer {key}`", text) for key, text in COMMANDS.items()]
-    )
+    rows = [(f"`viewer {name}`", text) for name, text in COMMANDS.items()]
+    return table(("command", "purpose"), rows)
 
 
 def options() -> str:

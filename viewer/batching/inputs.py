@@ -11,7 +11,7 @@ from pathlib import Path
 
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
-from viewer.formats import FORMATS, SUFFIXES
+from viewer.formats import FORMATS, all_suffixes
 from viewer.formats._published_models import published_names
 from viewer.phrases import counted, listed, printable
 
@@ -53,7 +53,7 @@ def find_inputs(
     each folder is one input, as recordings and models that consist of a folder always are.
     ``output``: folder of the outputs, whose files are not inputs of a batch that is resumed.
     """
-    wanted = {suffix.lower() for suffix in suffixes} or {*SUFFIXES} - {*_AMBIGUOUS}
+    wanted = {suffix.lower() for suffix in suffixes} or {*all_suffixes()} - {*_AMBIGUOUS}
     search = _Search(wanted, keeps_folders, os.path.abspath(output) if output else "")
     for name in lists:
         search.add_list(name)

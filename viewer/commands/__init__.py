@@ -13,8 +13,10 @@ COMMANDS = {
     "which pose",
     "lint": "check rigs and motions: what is wrong, where, and how to fix it",
     "models": "list body models: found, missing, where they are published, and their licences",
+    "new-plugin": "write a package with a plug-in to start from",
     "doctor": "check this machine: packages, OpenGL, display, and how to install missing parts",
     "help": "show a page of the manual, or an example script",
     "completion": "print a script that completes commands and options in bash, zsh, tcsh or fish",
 }
-"""Modules in this folder, each with ``add_arguments(parser)`` and ``run(arguments)``."""
+"""Modules in this folder, each with ``add_arguments(parser)`` and ``run(arguments)``. Names of
+modules have underscores for dashes."""

@@ -8,11 +8,12 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
 from viewer.errors import ViewerError
 from viewer.phrases import printable
+from viewer.plugins import plugin_of
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -84,28 +85,44 @@ class Parser(argparse.ArgumentParser):
 
 def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
     """Return the parser of a command; the first word selects the options of ``parser_of``."""
-    module = import_module(f"viewer.commands.{name}")
+    module = command_module(name)
     own: Parser | None = module.parser_of(words) if words and hasattr(module, "parser_of") else None
     if own is not None:
         return own
-    parser = Parser(prog=f"viewer {name}", description=COMMANDS[name])
+    text = COMMANDS.get(name, "a command of a plug-in")
+    parser = Parser(prog=f"viewer {name}", description=text)
     module.add_arguments(parser)
     return parser
 
 
-def check_command(word: str) -> None:
-    """Raise for a first argument that is not a file but resembles a command."""
+def command_module(name: str) -> Any:
+    """Return the module of a command: a key of ``COMMANDS``, or the name of a plug-in."""
+    if name in COMMANDS:
+        return import_module(f"viewer.commands.{name.replace('-', '_')}")
+    plugin = plugin_of("commands", name)
+    assert plugin is not None  # as ``is_plugged_command`` has found it
+    module = plugin.load()
+    if not (hasattr(module, "run") and hasattr(module, "add_arguments")):
+        raise plugin.error("expected the functions add_arguments and run")
+    return module
+
+
+def is_plugged_command(word: str) -> bool:
+    """Return whether a first argument is a plug-in's command; raise if it is a misspelt one."""
     from viewer.models import resolve
     from viewer.near_names import did_you_mean
 
-    if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):
-        return
+    if not _WORD.fullmatch(word.replace("-", "")) or os.path.lexists(resolve(word)):
+        return False
+    if plugin_of("commands", word) is not None:
+        return True
     near = did_you_mean(word, COMMANDS)
     if near:
         raise ViewerError(
             f'no command and no file is called "{printable(word, _LONGEST)}"; {near} '
             "(viewer --help lists the commands)"
         )
+    return False
 
 
 def require_files(files: Sequence[str], body: bool, command: str) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from importlib import import_module
 from typing import Any
 
 from viewer.commands import COMMANDS
 from viewer.commands._batch.jobs import JOBS, add_all_arguments
-from viewer.commands._usage import Parser
+from viewer.commands._usage import Parser, command_module
 from viewer.models.download import ADDABLE
 
 _SHELLS = ("bash", "zsh", "tcsh", "fish")
@@ -113,7 +112,7 @@ def command_line() -> argparse.ArgumentParser:
                 add_all_arguments(inner, job)
                 _complete_values(inner)
         else:
-            import_module(f"viewer.commands.{name}").add_arguments(parser)
+            command_module(name).add_arguments(parser)
             _complete_values(parser)
     return whole
 

@@ -19,10 +19,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import viewer
+from viewer.commands import COMMANDS
 from viewer.commands._printing import print_line
 from viewer.data_classes import dataclass
-from viewer.errors import RenderError
+from viewer.errors import PluginError, RenderError
 from viewer.phrases import counted, printable
+from viewer.plugins import GROUPS, plugins_of
 
 if TYPE_CHECKING:
     from viewer.rendering.offscreen import Offscreen
@@ -111,6 +113,7 @@ def examine() -> Iterator[_Finding]:
         "viewer", "ok", f"{viewer.__version__}, Python {sys.version.split()[0]}, {system}"
     )
     yield from _examine_packages()
+    yield from _examine_plugins()
     yield from _examine_devices()
     yield from _examine_drawing()
     yield from _examine_display()
@@ -130,6 +133,32 @@ def _examine_packages() -> Iterator[_Finding]:
         cure = f"pip install {' '.join(missing)}"
         yield _Finding("packages", "missing", ", ".join(missing), cure, is_vital=True)
     yield from _examine_extras()
+
+
+def _examine_plugins() -> Iterator[_Finding]:
+    """List plug-ins by package; each is imported, to see that it can be used."""
+    from viewer.formats import SUFFIXES
+    from viewer.rigs.scalars import SCALARS
+
+    own = {
+        "formats": {suffix[1:] for suffix in SUFFIXES},
+        "scalars": {*SCALARS},
+        "commands": {*COMMANDS},
+    }
+    found: dict[str, list[str]] = {}
+    for plugin in (each for group in GROUPS for each in plugins_of(group)):
+        try:
+            plugin.load()
+        except PluginError as problem:
+            yield _Finding("plug-in", "missing", str(problem))
+            continue
+        if plugin.name in own[plugin.group]:
+            unused = f"{plugin.distribution}: {plugin.group} {plugin.name} is not used"
+            yield _Finding("plug-in", "note", f"{unused}: this program has its own")
+            continue
+        found.setdefault(plugin.distribution, []).append(f"{plugin.group} {plugin.name}")
+    for package, rows in found.items():
+        yield _Finding("plug-in", "ok", f"{package}: {', '.join(rows)}")
 
 
 def _examine_extras() -> Iterator[_Finding]:

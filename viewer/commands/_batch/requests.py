@@ -39,6 +39,7 @@ from viewer.errors import ViewerError
 from viewer.media.unfinished import new_prefix
 from viewer.models import named_files, use_model_folder
 from viewer.phrases import listed, printable
+from viewer.plugins import are_enabled
 from viewer.rigs.bodies.smpl_family import GENDERS
 from viewer.version import VERSION
 
@@ -59,6 +60,8 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     add_job_arguments(parser, name)
     known = {action.dest for action in parser._actions if action.dest != "help"}
     options = {each: getattr(arguments, each) for each in known | parser._defaults.keys()}
+    if not are_enabled():
+        options["no_plugins"] = True  # for worker processes
     remark = ""
     if options.get("model_path") is not None:
         remark = use_model_folder(options["model_path"])

@@ -6,10 +6,10 @@ A quantity is named by its key, followed by its joint or field if it has one: ``
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from keyword import iskeyword
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -23,8 +23,11 @@ from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.scalars._inputs import Asked, field_of, influences_kept
 from viewer.rigs.skeleton import find_joint, joint_label, joint_labels
-from viewer.rigs.skinning import METHODS, PURE, Skinning
+from viewer.rigs.skinning import METHODS, PURE, Skinning, deform
 from viewer.rigs.units import METRES
+
+if TYPE_CHECKING:
+    from viewer.plugins import Plugin
 
 # Smaller values are 0; relative to the figure's size for lengths, otherwise absolute.
 _NOISE = 1e-9
@@ -115,9 +118,68 @@ SCALARS = {
 """Quantities by name, in menu order."""
 
 
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A scalar quantity of a plug-in.
+
+    Parameters
+    ----------
+    compute : callable
+        Takes a ``Figure`` and its posed vertices (V, 3), and returns values (V,).
+    title : str
+        Label in menus and the legend.
+    unit : str
+        ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
+    kind : str
+        ``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0.
+    """
+
+    compute: Callable[[Figure, Floats], Floats]
+    title: str
+    unit: str = ""
+    kind: Literal["sequential", "diverging"] = "sequential"
+
+
+_PLUGGED: dict[str, tuple[Plugin, Scalar]] = {}
+"""Quantities of plug-ins that were used; their rows are in ``SCALARS``, too."""
+
+
+def _find_plugin(key: str) -> None:
+    """Add the row of a plug-in to ``SCALARS`` if one has a key that is not there yet."""
+    if key in SCALARS:
+        return
+    from viewer.plugins import plugin_of
+
+    plugin = plugin_of("scalars", key)
+    if plugin is None:
+        return
+    found = plugin.load()
+    if not isinstance(found, Scalar):
+        raise plugin.error(f"expected a Scalar, found {type(found).__name__}")
+    _PLUGGED[key] = plugin, found
+    SCALARS[key] = _Quantity(found.title, "", "a mesh", found.kind, found.unit)
+
+
+def _plugged_values(
+    plugin: Plugin, quantity: Scalar, figure: Figure, pose: Pose | None, skinning: Skinning
+) -> Floats:
+    """Return the values (V,) of a plug-in's quantity, which are checked."""
+    posed = figure.require_mesh().positions
+    if pose is not None and figure.is_attached:
+        posed, _ = deform(figure, pose, skinning)
+    with plugin.guarded("cannot be computed"):
+        values: Floats = np.array(quantity.compute(figure, posed), dtype=np.float64)
+    if values.shape != (len(posed),) or not np.isfinite(values).all():
+        raise plugin.error(
+            f"expected finite values of shape ({len(posed)},), found shape {values.shape}"
+        )
+    return values
+
+
 def split_name(name: str) -> tuple[str, str]:
     """Split "weight:left_knee" into key and joint or field; ``RigError`` if that is invalid."""
     key, colon, about = name.partition(":")
+    _find_plugin(key)
     if key not in SCALARS:
         raise RigError(f'no scalar quantity "{key}"; {name_hint(key, SCALARS)}')
     if colon and not SCALARS[key].about:
@@ -138,8 +200,11 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     key, about = split_name(name)
     quantity = SCALARS[key]
     mesh = figure.require_mesh()
-    if _missing(quantity.needs, figure) or (quantity.moves and pose is None):
+    is_still = quantity.moves and pose is None and key not in _PLUGGED
+    if _missing(quantity.needs, figure) or is_still:
         return np.full(mesh.n_vertices, -1.0 if quantity.kind == "categorical" else 0.0)
+    if key in _PLUGGED:
+        return _plugged_values(*_PLUGGED[key], figure, pose, skinning)
     index = joint_of(figure, about) if quantity.takes_joint else -1
     module = import_module(f"{__name__}.{quantity.module}")
     values: Floats = getattr(module, f"{key}_" if iskeyword(key) else key.replace("-", "_"))(
@@ -214,6 +279,7 @@ def missing_part(name: str, figure: Figure) -> str:
 def _missing(needs: str, figure: Figure) -> str:
     """Return the name of a part if a figure lacks it, otherwise an empty string."""
     has = {
+        "a mesh": figure.mesh is not None,
         "weights": figure.skin is not None,
         "a skin": figure.is_attached,
         "pose correctives": figure.is_attached and figure.correctives is not None,

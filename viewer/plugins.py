@@ -1,0 +1,114 @@
+"""Plug-ins: rows of registries that other installed packages add through entry points.
+
+A package states them in its ``pyproject.toml``; the name of an entry point is the key of a row::
+
+    [project.entry-points."viewer.formats"]
+    off = "viewer_off.off"                   # reads .off: a module with read(source)
+
+    [project.entry-points."viewer.scalars"]
+    height = "viewer_off.heights:HEIGHT"     # a viewer.rigs.scalars.Scalar
+
+    [project.entry-points."viewer.commands"]
+    tidy = "viewer_off.tidy"                 # a module with add_arguments(parser), run(arguments)
+
+Entry points are looked up only if a registry lacks a key, so programs without plug-ins start as
+fast, and rows of this program cannot be replaced. A module is imported when its row is used. Any
+exception of a plug-in becomes an error of one line that names its distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, Literal, TypeAlias, get_args
+
+from viewer.data_classes import dataclass
+from viewer.errors import PluginError, ViewerError
+from viewer.phrases import printable
+
+Group: TypeAlias = Literal["formats", "scalars", "commands"]
+
+GROUPS: tuple[Group, ...] = get_args(Group)
+
+_is_enabled = True
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """A row that a package adds to a registry."""
+
+    group: Group
+    """The registry."""
+    name: str
+    """Key of the row."""
+    target: str
+    """Module, and the object in it if it is not the module itself: ``module:object``."""
+    distribution: str
+    """Name and version of the installed package."""
+
+    def load(self) -> Any:
+        """Import the module, and return what the entry point names."""
+        from importlib import import_module
+        from operator import attrgetter
+
+        module, _, name = self.target.partition(":")
+        with self.guarded("cannot be imported"):
+            found = import_module(module)
+            return attrgetter(name)(found) if name else found
+
+    @contextmanager
+    def guarded(self, what: str) -> Iterator[None]:
+        """Turn exceptions of the plug-in into errors of one line; ``what`` failed."""
+        try:
+            yield
+        except ViewerError:
+            raise
+        except Exception as problem:
+            reason = printable(f"{type(problem).__name__}: {problem}", 300)
+            raise self.error(f"{what}: {reason}") from problem
+
+    def error(self, problem: str) -> PluginError:
+        """Return an error that names the distribution."""
+        return PluginError(f"plug-in {self.distribution} ({self.group} {self.name}): {problem}")
+
+
+def plugin_of(group: Group, name: str) -> Plugin | None:
+    """Return the plug-in with a key, if plug-ins are enabled and one has it."""
+    return next((found for found in plugins_of(group) if found.name == name), None)
+
+
+def plugins_of(group: Group) -> tuple[Plugin, ...]:
+    """Return the plug-ins of a registry, by name; of several with one name, the first."""
+    return _installed(group) if _is_enabled else ()
+
+
+def are_enabled() -> bool:
+    """Return whether installed plug-ins are used."""
+    return _is_enabled
+
+
+@contextmanager
+def without_plugins() -> Iterator[None]:
+    """Ignore installed plug-ins in the block."""
+    global _is_enabled
+    before, _is_enabled = _is_enabled, False
+    try:
+        yield
+    finally:
+        _is_enabled = before
+
+
+@cache
+def _installed(group: Group) -> tuple[Plugin, ...]:
+    from importlib.metadata import entry_points
+
+    found: dict[str, Plugin] = {}
+    for each in sorted(entry_points(group=f"viewer.{group}"), key=lambda each: each.name):
+        package = "of an unknown package"
+        if each.dist is not None:
+            package = f"{each.dist.metadata['Name']} {each.dist.version}"
+        found.setdefault(
+            each.name, Plugin(group, each.name, each.value.strip(), printable(package, 100))
+        )
+    return tuple(found.values())
