@@ -1,5 +1,7 @@
 """Small rigged figures for tests of rig transfer."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from viewer.rigs.figure import Figure
@@ -66,3 +68,39 @@ def arm(root_moves=True, limit=np.inf) -> Figure:
     )
     skin = skin_from_entries(len(positions), vertices[kept], joints[kept], weights[kept], bind)
     return Figure("arm", mesh_of(positions, triangles), skeleton, skin)
+
+
+def pipe(corners, radius, around=8, end_radius=None):
+    """Return a closed tube along a polyline, its ends tapered to points: positions, triangles."""
+    corners = np.asarray(corners, dtype=float)
+    points = np.concatenate([np.linspace(a, b, 6)[:-1] for a, b in pairwise(corners)])
+    points = np.concatenate([points, corners[-1:]])
+    radii = np.linspace(radius, radius if end_radius is None else end_radius, len(points))
+    ways = np.gradient(points, axis=0)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    across = np.cross(ways, np.eye(3)[np.abs(ways).max(axis=0).argmin()])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    angles = np.arange(around) * 2 * np.pi / around
+    rings = [
+        p + r * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * np.cross(w, u))
+        for p, r, u, w in zip(points, radii, across, ways, strict=True)
+    ]
+    ends = [points[0] - radii[0] * ways[0], points[-1] + radii[-1] * ways[-1]]
+    ring = np.arange(around * len(points)).reshape(len(points), around)
+    a, b = ring[:-1], np.roll(ring, -1, axis=1)[:-1]
+    c, d = np.roll(ring, -1, axis=1)[1:], ring[1:]
+    sides = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    low = ring.size
+    following = np.roll(np.arange(around), -1)
+    caps = [
+        *[(low, ring[0, after], ring[0, k]) for k, after in enumerate(following)],
+        *[(low + 1, ring[-1, k], ring[-1, after]) for k, after in enumerate(following)],
+    ]
+    return np.concatenate([*rings, ends]), np.concatenate([sides, caps]).astype(np.int32)
+
+
+def united(*parts):
+    """Return one mesh of several parts: positions, triangles."""
+    starts = np.cumsum([0, *(len(part[0]) for part in parts)])
+    triangles = [part[1] + start for part, start in zip(parts, starts, strict=False)]
+    return np.concatenate([part[0] for part in parts]), np.concatenate(triangles)

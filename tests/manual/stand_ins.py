@@ -245,6 +245,8 @@ def _motions(folder: Path) -> None:
     )
     _made("convert", "assets/samples/fox.skel", "assets/samples/fox.skin", "-o", "cat.ply")
     _made("convert", "--body", "-o", "scan.obj")
+    shutil.copy("cat.ply", "spider.ply")
+    _made("convert", "spider.ply", "-o", "spider.obj")
     _made("rig", "scan.obj", "--from", "body", "-o", "scan.npz", "--method", "nearest")
 
 

@@ -163,7 +163,7 @@ def anatomy_of(
         )
         for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
     ]
-    pairs = _paired(limbs, sides[tips] > 0.0, lateral, offset, size)
+    pairs = paired(limbs, sides[tips] > 0.0, lateral, offset, size)[:_MOST_PAIRS]
     report_fraction(1.0, "anatomy")
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
@@ -240,10 +240,10 @@ def _is_limb(found: Protrusion) -> bool:
     return found.tip - found.junction >= _OWN * found.tip
 
 
-def _paired(
+def paired(
     limbs: list[Limb], positive: Bools, lateral: Floats, offset: float, size: float
 ) -> tuple[LimbPair, ...]:
-    """Pair the limbs of both sides, the most similar ones first."""
+    """Pair the limbs of both sides, the most similar ones first; the longest pair is the first."""
     ours = [limb for limb, side in zip(limbs, positive.tolist(), strict=True) if side]
     others = [limb for limb, side in zip(limbs, positive.tolist(), strict=True) if not side]
     costs = []
@@ -263,7 +263,7 @@ def _paired(
             left.remove(i)
             right.remove(j)
             pairs.append(LimbPair((ours[i], others[j])))
-    return tuple(sorted(pairs, key=lambda pair: -pair.length))[:_MOST_PAIRS]
+    return tuple(sorted(pairs, key=lambda pair: -pair.length))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

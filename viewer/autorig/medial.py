@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.autorig.solid import Solid
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -64,6 +64,8 @@ class Tips:
 
     rows: Ints
     """(N,). The farthest voxel of each, as rows of the solid, in ascending order of level sets."""
+    stood_out: Bools
+    """(N,). Whether it stayed where it met another protrusion, even if it was the longest."""
     meetings: tuple[tuple[float, frozenset[int]], ...]
     """Distances at which two or more of them merge, and the indices of all that have merged."""
 
@@ -102,6 +104,7 @@ class LevelSets:
         group = list(range(self.count))
         kept = [[node] for node in range(self.count)]
         meetings: list[tuple[float, list[int]]] = []
+        standing: set[int] = set()
 
         def root(node: int) -> int:
             while group[node] != node:
@@ -118,11 +121,14 @@ class LevelSets:
             tips = sorted(base_of, key=lambda tip: float(self._farthest[tip]))
             if tips:
                 junction = self._thickness * float(self._band[node])
-                others = [
+                passed = [
                     tip
-                    for tip in tips[:-1]
-                    if stays(Protrusion(float(self._farthest[tip]), junction, base_of[tip]))
+                    for tip in tips
+                    if len(tips) > 1
+                    and stays(Protrusion(float(self._farthest[tip]), junction, base_of[tip]))
                 ]
+                standing.update(passed)
+                others = [tip for tip in passed if tip != tips[-1]]
                 kept[node] = others + tips[-1:]
                 if len({base_of[tip] for tip in kept[node]}) > 1:
                     meetings.append((junction, kept[node]))
@@ -140,16 +146,24 @@ class LevelSets:
         order = rows[np.lexsort((-self._distances[rows], self.labels[rows]))]
         first = np.unique(self.labels[order], return_index=True)[1]
         return Tips(
-            order[first].astype(np.int32), tuple((at, those) for at, those in met if len(those) > 1)
+            order[first].astype(np.int32),
+            np.array([tip in standing for tip in found], dtype=np.bool_),
+            tuple((at, those) for at, those in met if len(those) > 1),
         )
+
+    def middles(self, centers: Floats) -> Floats:
+        """Return the mean of each level set's voxels, from all centres (N, 3)."""
+        sizes = np.bincount(self.labels, minlength=self.count)
+        sums = np.stack([np.bincount(self.labels, column) for column in centers.T], axis=1)
+        means: Floats = sums / sizes[:, None]
+        return means
 
     def half_widths(self, centers: Floats) -> Floats:
         """Return the half of each level set's largest extent, from its voxels' centres (N, 3)."""
         # A disc of radius r has a variance of r^2 / 4 along each of its axes, so that r is twice
         # the root of the largest eigenvalue of the covariance; a strip of width w gets 0.58 w.
         sizes = np.bincount(self.labels, minlength=self.count)
-        means = np.stack([np.bincount(self.labels, column) for column in centers.T], axis=1)
-        apart = centers - (means / sizes[:, None])[self.labels]
+        apart = centers - self.middles(centers)[self.labels]
         covariance = np.zeros((self.count, 3, 3))
         for i in range(3):
             for j in range(3):

@@ -29,6 +29,41 @@ JOINTS: tuple[JointPlaces, ...] = ("surface", "alignment")
 """Placement of joints: by the surface around them, or only by the alignment."""
 
 
+SYMMETRIES: dict[str, str] = {
+    "auto": "automatic",
+    "x": "across x",
+    "y": "across y",
+    "z": "across z",
+    "none": "none",
+}
+"""Planes of symmetry of a skeleton that is found in a mesh, with their labels."""
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonSettings:
+    """Options of the skeleton that is found in a mesh."""
+
+    symmetry: str = setting(
+        "auto",
+        "with --auto, the axis along which limbs mirror each other, or none; auto: if a vertical "
+        "plane of symmetry is found (default: {default})",
+        choices=SYMMETRIES,
+    )
+    joint_spacing: float = setting(
+        1.0,
+        "with --auto, distance of the joints in limbs without sharp bends, relative to the usual "
+        "distance (default: {default})",
+        metavar="X",
+        limits=(0.1, 10.0),
+    )
+
+    def __post_init__(self) -> None:
+        if self.symmetry not in SYMMETRIES:
+            raise RigError(f'symmetry: expected {", ".join(SYMMETRIES)}, found "{self.symmetry}"')
+        if not 0.1 <= self.joint_spacing <= 10.0:
+            raise RigError(f"joint_spacing: expected 0.1 to 10, found {self.joint_spacing:g}")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferSettings:
     """Options of a rig transfer."""

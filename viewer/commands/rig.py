@@ -26,7 +26,7 @@ from viewer.autorig.alignment.surface_alignment import AlignmentSettings, stated
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
-from viewer.autorig.settings import BINDING, TransferSettings
+from viewer.autorig.settings import BINDING, SkeletonSettings, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
 from viewer.commands._keywords import arguments_of, paths_of, without_dashes
@@ -98,6 +98,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "for other files of the skeleton or its motion",
     )
     parser.add_argument(
+        "--auto",
+        action="store_true",
+        help="bind the mesh to a skeleton found in its shape instead: for what is no person and no "
+        "quadruped, such as a spider, an octopus, a hand or a robot arm",
+    )
+    parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
@@ -119,11 +125,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     group = parser.add_argument_group("method")
-    usual = f"; default: robust, or {BINDING[0]} with --skeleton"
+    usual = f"; default: robust, or {BINDING[0]} with --skeleton and --auto"
     add_settings(group, TransferSettings, "method", given=None, usual=usual)
     add_settings(group, MatchSettings)
     add_settings(group, WeightSettings)
     add_settings(group, TransferSettings, "joints", "fits", "correctives")
+    add_settings(group, SkeletonSettings)
     group = parser.add_argument_group("alignment")
     add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
     add_settings(group, AlignmentSettings, "scale")
@@ -175,7 +182,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     _name_template_frame(arguments, frames)
-    template_files, template = _asked_template(arguments, pose, frames, inputs)
+    template_files, template, found = _asked_template(arguments, target, pose, frames, inputs)
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
@@ -183,7 +190,7 @@ def run(arguments: argparse.Namespace) -> int:
     clips = _read_clips(arguments.clips, output, template_files, template.figure, frames.fps)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
-    rigged = _transferred(target, template, settings)
+    rigged = _transferred(target, template, settings, found)
     stream = sys.stdout if output is None else summary_stream(output)
     print_warnings(line for line in rigged.lines if line.severity == "warning")
     notes = [str(line) for line in rigged.lines if line.severity == "note"]
@@ -220,9 +227,10 @@ def rig(
     skeleton : path, name, or sequence of them, optional
         Binds the mesh to the skeleton of this file instead, where it is.
     **options
-        Options of the command with underscores: ``method``, ``max_distance``, ``max_angle``
-        (degrees), ``smooth``, ``max_influences``, ``joints``, ``fit``, ``correctives``, ``up``,
-        ``facing``, ``scale``, ``landmarks``, ``refine``, ``template_pose`` and others.
+        Options of the command with underscores: ``auto``, ``method``, ``max_distance``,
+        ``max_angle`` (degrees), ``smooth``, ``max_influences``, ``joints``, ``fit``,
+        ``correctives``, ``up``, ``facing``, ``scale``, ``landmarks``, ``refine``,
+        ``template_pose`` and others.
 
     Returns
     -------
@@ -253,25 +261,38 @@ def rig(
         )
         pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
         _name_template_frame(arguments, frames)
-        actor = _asked_template(arguments, pose, frames, inputs)[1]
+        _, actor, found = _asked_template(arguments, figure, pose, frames, inputs)
         settings = _settings(arguments, actor, None, figure.up)
-        rigged = _transferred(figure, actor, settings)
+        rigged = _transferred(figure, actor, settings, found)
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
     return Scene([result], (*said.found, *rigged.lines), world_up=rigged.figure.up, files=inputs)
 
 
 def _asked_template(
-    arguments: argparse.Namespace, pose: PoseOptions, frames: Frames, inputs: list[Path]
-) -> tuple[list[Path], Actor]:
-    """Return the files of the requested template or skeleton, and its figure."""
-    option = "--skeleton" if arguments.skeleton else "--from"
+    arguments: argparse.Namespace,
+    target: Figure,
+    pose: PoseOptions,
+    frames: Frames,
+    inputs: list[Path],
+) -> tuple[list[Path], Actor, tuple[Diagnostic, ...]]:
+    """Return the files of the requested template or skeleton, its figure, and messages about it."""
     _check_options(arguments)
+    if arguments.auto:
+        from viewer.autorig.curve_skeleton import find_skeleton
+
+        how = settings_of(SkeletonSettings, arguments)
+        sides = AlignmentSettings(up=arguments.up, facing=arguments.facing)
+        title = f"rigging {printable(target.name, 40)}"
+        with shown_progress(title), part_of_work(title):
+            found = find_skeleton(target, target.require_mesh(), how, sides)
+        return [], Actor(found.figure, figure_pose(found.figure)), found.lines
+    option = "--skeleton" if arguments.skeleton else "--from"
     files = [
         file
         for name in arguments.skeleton or arguments.template or ["body"]
         for file in _template_files(name)
     ]
-    return files, _template(files, option, arguments.rig or "", pose, frames, inputs)
+    return files, _template(files, option, arguments.rig or "", pose, frames, inputs), ()
 
 
 def _name_template_frame(arguments: argparse.Namespace, frames: Frames) -> None:
@@ -283,17 +304,20 @@ def _name_template_frame(arguments: argparse.Namespace, frames: Frames) -> None:
     frames.frame, frames.option = arguments.template_frame, "--template-frame"
 
 
-def _transferred(target: Figure, template: Actor, settings: TransferSettings) -> Rigged:
-    """Return the target with the template's rig; a progress bar is shown."""
+def _transferred(
+    target: Figure, template: Actor, settings: TransferSettings, found: tuple[Diagnostic, ...]
+) -> Rigged:
+    """Return the target with the template's rig; ``found``: messages about the template."""
     title = f"rigging {printable(target.name, 40)}"
     with shown_progress(title), part_of_work(title):
-        return transfer(
+        rigged = transfer(
             template.figure,
             template.require_pose(),
             target.require_mesh(),
             settings,
             target.name,
         )
+    return replace(rigged, lines=(*found, *rigged.lines))
 
 
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
@@ -315,18 +339,29 @@ def _one_mesh(scene: Scene) -> Figure:
         return figure
     if figure.is_rigged:
         print_warnings([f"{printable(figure.name, 60)} already has a rig, which is ignored"])
-    return Figure(figure.name, posed_mesh(figure, actor.pose))
+    mesh = posed_mesh(figure, actor.pose)
+    return Figure(figure.name, mesh, up=figure.up, unit=figure.unit)
 
 
 def _check_options(arguments: argparse.Namespace) -> None:
-    """Check that the options for templates are not given together with a skeleton."""
-    if not arguments.skeleton:
+    """Check that options are not given together with others that do not use them."""
+    sources = {
+        "--from": bool(arguments.template),
+        "--skeleton": bool(arguments.skeleton),
+        "--auto": arguments.auto,
+    }
+    found = [option for option, is_given in sources.items() if is_given]
+    if len(found) > 1:
+        all_found = "both" if len(found) == 2 else "all"
+        raise ViewerError(f"{' and '.join(found)}: expected one of them, found {all_found}")
+    if settings_of(SkeletonSettings, arguments) != SkeletonSettings() and not arguments.auto:
+        raise ViewerError("--symmetry and --joint-spacing: expected --auto, found none")
+    if not arguments.skeleton and not arguments.auto:
         return
-    if arguments.template:
-        raise ViewerError("--from and --skeleton: expected one of them, found both")
+    (source,) = found
     if arguments.method not in (None, *BINDING):
         names = " or ".join(BINDING)
-        raise ViewerError(f"--method: expected {names} with --skeleton, found {arguments.method}")
+        raise ViewerError(f"--method: expected {names} with {source}, found {arguments.method}")
     own, usual = settings_of(TransferSettings, arguments), TransferSettings()
     match, usual_match = settings_of(MatchSettings, arguments), MatchSettings()
     only_for_templates = {
@@ -336,9 +371,19 @@ def _check_options(arguments: argparse.Namespace) -> None:
         "--no-fit": own.fits != usual.fits,
         "--no-refine": not settings_of(AlignmentSettings, arguments).refines,
     }
+    if arguments.auto:
+        alignment = settings_of(AlignmentSettings, arguments)
+        only_for_templates |= {
+            "--scale": alignment.scale != AlignmentSettings().scale,
+            "--landmarks": arguments.landmarks is not None,
+            "--template-pose": arguments.pose is not None,
+            "--template-frame": arguments.template_frame is not None,
+            "--clip": bool(arguments.clips),
+            "--rig": arguments.rig is not None,
+        }
     for option, is_given in only_for_templates.items():
         if is_given:
-            raise ViewerError(f"{option}: expected a template (--from) to match, found --skeleton")
+            raise ViewerError(f"{option}: expected a template (--from) to match, found {source}")
 
 
 def _template(
@@ -412,18 +457,18 @@ def _settings(
         landmarks = read_landmarks(source, template.figure, template.require_pose())
     if arguments.smooth < 0:
         raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
+    # A skeleton found in the mesh is where it should be.
+    alignment = AlignmentSettings()
+    if not arguments.auto:
+        up = arguments.up or stated_up(target_up)
+        alignment = settings_of(AlignmentSettings, arguments, landmarks=landmarks, up=up)
     settings = settings_of(
         TransferSettings,
         arguments,
-        alignment=settings_of(
-            AlignmentSettings,
-            arguments,
-            landmarks=landmarks,
-            up=arguments.up or stated_up(target_up),
-        ),
+        alignment=alignment,
         weights=settings_of(WeightSettings, arguments, match=settings_of(MatchSettings, arguments)),
     )
-    if arguments.skeleton and arguments.method is None:
+    if (arguments.skeleton or arguments.auto) and arguments.method is None:
         settings = replace(settings, method=BINDING[0])
     as_rig = output is not None and output.suffix.lower() != ".npz"
     return replace(settings, correctives=False) if as_rig else settings

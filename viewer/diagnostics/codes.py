@@ -256,6 +256,19 @@ CODES: dict[str, Code] = {
     "R012": Code("warning", "rigged figure differs from the target", "check the alignment"),
     "R013": Code("note", "template data not transferred", "none if the data is not needed"),
     "R014": Code("note", "property derived from the target", "none if it is correct"),
+    "R015": Code(
+        "note",
+        "skeleton found in the mesh",
+        Remedy(
+            "none if left and right are correct; otherwise specify Facing or Symmetry",
+            "none if left and right are correct; otherwise specify --facing or --symmetry",
+        ),
+    ),
+    "R016": Code(
+        "warning",
+        "parts of the mesh without joints",
+        Remedy("choose a skeleton as template", "specify --skeleton"),
+    ),
     # Comparison
     "D001": Code(
         "warning", "part without a counterpart", "compare files of the same figure and motion"

@@ -1,0 +1,211 @@
+"""Skeletons found in shapes made of tubes, whose joints are known."""
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import mesh_of, pipe, turn, united
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.autorig import curve_skeleton
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.curve_skeleton import find_skeleton
+from viewer.autorig.settings import SkeletonSettings
+from viewer.cli import run
+from viewer.errors import RigError
+from viewer.exporters import export
+from viewer.progress import Cancelled, receiving
+from viewer.rigs.figure import Figure
+from viewer.rigs.scene import Actor
+
+KNEES = {"leg_1": [(0.2, 0.5, 0.25), (0.8, 0.9, 0.7), (1.1, 0.02, 1.0)],
+         "leg_2": [(0.2, 0.5, -0.25), (0.9, 0.9, -0.6), (1.3, 0.02, -0.9)]}  # fmt: skip
+TRUNK = pipe([(0, 0.5, -0.45), (0, 0.5, 0.45)], 0.25)
+
+
+def beast(left=KNEES, right=KNEES):
+    """Return a trunk along z with two pairs of legs that bend once."""
+    legs = [pipe(corners, 0.05) for corners in left.values()]
+    legs += [pipe(np.multiply(corners, [-1, 1, 1]), 0.05) for corners in right.values()]
+    return united(TRUNK, *legs)
+
+
+def found(shape, facing=None, up=None, **how):
+    mesh = mesh_of(*shape)
+    sides = AlignmentSettings(up=up, facing=facing)
+    return find_skeleton(Figure("shape", mesh), mesh, SkeletonSettings(**how), sides)
+
+
+def joints_of(skeleton):
+    """Return positions by name; all joints are unrotated."""
+    places = np.array(skeleton.rest_translations)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            places[joint] += places[parent]
+    return dict(zip(skeleton.names, places, strict=True))
+
+
+def parent_of(skeleton, name):
+    return skeleton.names[skeleton.parents[skeleton.names.index(name)]]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse():
+    """Coarser voxels, for speed: 96 along the longest side."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(curve_skeleton, "_FINEST", 96)
+        yield
+
+
+@pytest.fixture(scope="module")
+def walker():
+    return found(beast())
+
+
+def test_legs_begin_at_the_trunk_bend_at_the_knees_and_end_at_the_feet(walker):
+    joints = joints_of(walker.figure.skeleton)
+    assert np.linalg.norm(joints["root"][:2] - [0.0, 0.5]) < 0.05
+    for leg, (_, knee, foot) in KNEES.items():
+        # To within the leg's thickness, 4 % of the size.
+        assert np.linalg.norm(joints[f"{leg}_left_2"] - knee) < 0.1
+        assert np.linalg.norm(joints[f"{leg}_left_end"] - foot) < 0.1
+        hip = joints[f"{leg}_left"]
+        assert 0.2 < np.hypot(hip[0], hip[1] - 0.5) < 0.5
+        assert parent_of(walker.figure.skeleton, f"{leg}_left_2") == f"{leg}_left"
+
+
+def test_pairs_mirror_each_other_and_are_numbered_from_the_front(walker):
+    joints = joints_of(walker.figure.skeleton)
+    left = [name for name in joints if "_left" in name]
+    assert len(left) == 6
+    for name in left:
+        mirrored = joints[name.replace("left", "right")] * [-1, 1, 1]
+        # The plane of symmetry is found to within a voxel, a 96th of the size.
+        assert_allclose(joints[name], mirrored, atol=2.6 / 96)
+    assert joints["leg_1_left"][2] > joints["leg_2_left"][2]
+    said = [str(line) for line in walker.lines]
+    assert "2 pairs mirrored" in said[0] and said[1].endswith("the front is +z")
+
+
+def test_left_follows_the_stated_front():
+    skeleton = found(beast(), facing="-z").figure.skeleton
+    joints = joints_of(skeleton)
+    assert joints["leg_1_left"][0] < 0.0 and joints["leg_1_left"][2] < 0.0
+
+
+def test_legs_in_other_poses_are_still_pairs_with_as_many_joints():
+    other = {"leg_1": [(0.2, 0.5, 0.25), (0.7, 1.1, 0.5), (1.2, 0.02, 0.8)],
+             "leg_2": [(0.2, 0.5, -0.25), (0.8, 1.0, -0.8), (1.2, 0.02, -1.2)]}  # fmt: skip
+    skeleton = found(beast(right=other), symmetry="x").figure.skeleton
+    joints = joints_of(skeleton)
+    for name in [name for name in joints if "_left" in name]:
+        assert name.replace("left", "right") in joints
+    assert np.linalg.norm(joints["leg_1_right_2"] - [-0.7, 1.1, 0.5]) < 0.1
+
+
+def test_size_and_place_do_not_matter(walker):
+    scale, move = 1e-3, 10.0
+    positions, triangles = beast()
+    there = joints_of(found((scale * positions + move, triangles)).figure.skeleton)
+    here = joints_of(walker.figure.skeleton)
+    assert [*there] == [*here]
+    for name, place in here.items():
+        assert np.linalg.norm((there[name] - move) / scale - place) < 0.1
+
+
+def test_z_is_up_where_the_file_or_an_option_says_so(walker):
+    positions, triangles = beast()
+    tilted = positions @ turn([1, 0, 0], np.pi / 2).T
+    result = found((tilted, triangles), up="z", facing="-y")
+    legs = {name for name in walker.figure.skeleton.names if "leg" in name}
+    assert len(legs) == 12 and legs < {*result.figure.skeleton.names}
+    assert result.figure.up == "z"
+
+
+def test_straight_tube_gets_even_joints_more_if_it_is_longer():
+    counts = []
+    for length in (1.0, 4.0):
+        skeleton = found(pipe([(0, 0, 0), (0, 0, length)], 0.06)).figure.skeleton
+        places = np.array([*joints_of(skeleton).values()])
+        assert np.abs(places[:, :2]).max() < 0.03
+        gaps = np.abs(np.diff(places[1:, 2]))
+        assert gaps.max() < 1.3 * gaps.min()
+        counts.append(skeleton.n_joints)
+    assert counts[1] >= counts[0] + 4
+    assert found(pipe([(0, 0, 0), (0, 0, 4)], 0.06), joint_spacing=0.5).figure.skeleton.n_joints > (
+        1.5 * counts[1]
+    )
+
+
+def test_arm_on_a_base_has_its_root_there_and_joints_at_its_bends():
+    corners = [(0, 0.2, 0), (0, 1.2, 0), (0.9, 1.2, 0), (1.1, 0.6, 0)]
+    base = pipe([(0, 0.12, 0), (0, 0.2, 0)], 0.25, around=16)
+    joints = joints_of(found(united(base, pipe(corners, 0.07))).figure.skeleton)
+    assert np.linalg.norm(joints["root"] - [0, 0.15, 0]) < 0.15
+    for corner in corners[1:3]:
+        nearest = min(np.linalg.norm(place - corner) for place in joints.values())
+        assert nearest < 0.08
+    assert len(joints) <= 6
+
+
+def test_shapes_without_limbs_get_one_joint_and_a_warning():
+    ball = pipe([(0, -0.1, 0), (0, 0.1, 0)], 0.5)
+    result = found(ball)
+    assert result.figure.skeleton.n_joints == 1
+    (line,) = result.lines
+    assert line.severity == "warning" and "no limbs found" in str(line)
+
+
+def test_ring_is_reported_as_far_from_the_skeleton():
+    angles = np.linspace(0.0, 2 * np.pi, 25)
+    ring = pipe(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), 0.1)
+    (loop,) = [line for line in found(ring).lines if line.code == "R016"]
+    assert loop.severity == "warning"
+
+
+def test_sheets_and_several_objects_are_refused():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1.0]])
+    with pytest.raises(RigError, match="found a sheet without thickness"):
+        found((corners, np.array([[0, 1, 2], [0, 2, 3]])))
+    one = beast()
+    with pytest.raises(RigError, match="expected one object, found parts far from the largest"):
+        found(united(one, (one[0] + [6.0, 0, 0], one[1])))
+
+
+def test_search_can_be_cancelled():
+    def cancel(done, total, unit, what):
+        if "limbs" in what:
+            raise Cancelled
+
+    with pytest.raises(Cancelled), receiving(cancel):
+        found(pipe([(0, 0, 0), (0, 0, 1)], 0.06))
+
+
+def test_command_binds_the_mesh_to_the_joints_that_it_finds(tmp_path, capsys):
+    target, output = tmp_path / "beast.obj", tmp_path / "beast.glb"
+    export(Actor(Figure("beast", mesh_of(*beast()))), target)
+    assert run(["rig", str(target), "--auto", "--symmetry", "x", "-o", str(output)]) == 0
+    assert "skeleton found in the mesh: " in capsys.readouterr().out
+    figure = viewer.load(output).actors[0].figure
+    assert {"root", "leg_1_left", "leg_2_right_end"} <= set(figure.skeleton.names)
+    foot = figure.mesh.positions[:, 1] < 0.05
+    skin = figure.skin
+    first = skin.joints[skin.starts[:-1]][foot]
+    assert all("leg" in figure.skeleton.names[joint] for joint in first.tolist())
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--auto", "--from", "body"], "--from and --auto: expected one of them, found both"),
+        (["--auto", "--method", "robust"], "expected heat or voxel with --auto, found robust"),
+        (["--auto", "--no-fit"], "--no-fit: expected a template (--from) to match, found --auto"),
+        (["--symmetry", "x"], "--symmetry and --joint-spacing: expected --auto, found none"),
+        (["--auto", "--joint-spacing", "0"], "--joint-spacing: expected 0.1 to 10, found 0"),
+        (["--auto", "--facing", "y"], "expected a facing perpendicular to the up axis y, found y"),
+    ],
+)
+def test_command_refuses_options_that_it_would_not_use(options, said, tmp_path, capsys):
+    target = tmp_path / "bar.obj"
+    export(Actor(Figure("bar", mesh_of(*TRUNK))), target)
+    assert run(["rig", str(target), *options]) == 2
+    assert said in capsys.readouterr().err

@@ -1,0 +1,841 @@
+"""Curve skeleton of any solid with limbs: joints where it branches and bends, or evenly spaced.
+
+The limbs are the protrusions of the solid as seen from its trunk: tips are maxima of the geodesic
+distance (``medial.LevelSets``), and the shortest paths from them through the middle of the solid
+form a tree (Sato et al. 2000). It is made twice: first from the deepest voxel, to find the trunk,
+then from there. The trunk is where most limbs meet, so that no branch has most of the tips; the
+foot of what stands on one limb, such as a plant or a robot's arm; or the thicker end of what has no
+branches.
+
+- Branches closer to each other than the solid's radius there are one joint: a *hub*.
+- A limb begins where its level set parts from those of the others: at the surface of the trunk.
+- Joints are where the path bends (Douglas and Peucker 1973) if it bends sharply a few times, as a
+  leg does. A straight or smoothly curved limb gets joints at even distances, whose number grows
+  with its length relative to its width: tails, tentacles, snakes, fingers.
+- Limbs on both sides of a plane of symmetry are paired. Both get the same number of joints, and
+  mirrored positions if they are in mirrored poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from viewer.autorig.alignment.orientation_search import (
+    axis_direction,
+    axis_rotations,
+)
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.anatomy import Limb, paired, sagittal_plane
+from viewer.autorig.medial import LevelSets, Paths, Protrusion
+from viewer.autorig.settings import SkeletonSettings
+from viewer.autorig.solid import Solid, solid_within
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase, note
+from viewer.errors import RigError
+from viewer.phrases import counted
+from viewer.progress import part_of_work, report_fraction
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
+from viewer.rigs.skeleton import ball_skeleton
+
+_FINEST = 160  # voxels along the longest side of thin meshes: legs of spiders
+_APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of the vertices there
+# Distance from the skeleton, relative to its half width and to the largest radius of the solid, and
+# fraction of the solid there for which loops and sheets are reported.
+_FAR, _MISSED = 2.0, 0.1
+_THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
+
+# Limbs.
+# Shortest limb: relative to the half width of its base, to the size, and in voxels. A bump is
+# wider than long.
+_OWN, _SHORTEST, _VOXELS = 1.0, 0.03, 3.0
+# A hub's reach relative to the solid's radius there: two branches that touch the same inscribed
+# ball are one.
+_REACH = 1.0
+_NARROWER = 0.8  # radius of a limb relative to that of the hub, below which it has its own joint
+# What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
+# to the solid's, and the ratio of the foot's radius to theirs.
+_FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
+
+# Joints along limbs.
+_TOLERANCE = 0.5  # of the polyline, relative to the half width
+_ROUGH = 1.0  # of the polyline, in voxels: paths are known to half a voxel
+_BENT = np.radians(20.0)  # least change of direction at a joint
+_SHARP = np.radians(35.0)  # change of direction that a jointed limb has at least once
+# A bend is sharp if most of its change of direction is within this length on both sides, relative
+# to the half width; a limb is jointed if most of its bends are sharp, weighted by their
+# squared angles.
+_AROUND, _MOST = 1.0, 0.6
+# Exponent in the number of bones of a smooth limb, (length / half width)^k. It gives a finger (8) 3
+# bones, a tentacle (30) 8, a snake (50) 10; joints as dense as in a finger would give a snake 20.
+_DENSITY = 0.6
+# Least distance of bends, relative to the half width and to the length: a rounded knee is one bend.
+_CLOSEST, _CLOSEST_PART = 3.0, 0.1
+_END = 0.5  # distance of the last joint from the tip, relative to the half width
+
+# Symmetry.
+# Fraction of the voxels whose mirror images are inside: without a doubt; and of a figure in an
+# asymmetric pose, if at least half of its tips are those of pairs.
+_SYMMETRIC, _POSED = 0.85, 0.5
+_CENTRAL = 1.5  # distance from the plane, in voxels or half widths, up to which a limb is central
+_MIRRORED = 1.5  # distance of a limb's path from the mirrored one, likewise
+_SAMPLES = 64  # points of paths that are compared
+_ON_GROUND = 0.12  # height of the tip of a leg, relative to the solid's, as in ``anatomy``
+_ASKEW = 0.5  # cosine of the angle between directions that are different ones
+_TRUNK = "trunk"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """A part of the skeleton without branches."""
+
+    start: int
+    """Hub at which it begins."""
+    end: int
+    """Hub at which it ends; -1 for a tip."""
+    points: Floats
+    """(K, 3). Smooth path between both."""
+    half_width: float
+    """Median of the half widths of its level sets."""
+    begin: float
+    """Length of the part of the path inside the hub where it begins; 0 for none."""
+    tips: frozenset[int]
+    """All tips beyond its start."""
+
+    @property
+    def length(self) -> float:
+        """Length of the path."""
+        return float(arc_lengths(self.points)[-1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tree:
+    """Hubs and chains of a solid, outwards from a place in it."""
+
+    hubs: Floats
+    """(H, 3). Positions; the first is the place itself. A hub comes after the one before it."""
+    radii: Floats
+    """(H,). Distances from the surface there."""
+    rows: Ints
+    """(H,). Their voxels."""
+    chains: tuple[Chain, ...]
+    """Sorted by the hubs where they begin."""
+    tips: Ints
+    """(N,). Voxels of the tips."""
+
+
+def arc_lengths(points: Floats) -> Floats:
+    """Return the length of a polyline up to each of its points (K, 3): (K,)."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def at_lengths(points: Floats, lengths: Floats) -> Floats:
+    """Return points at lengths (N,) along a polyline (K, 3): (N, 3)."""
+    known = arc_lengths(points)
+    return np.stack([np.interp(lengths, known, column) for column in points.T], axis=1)
+
+
+def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
+    """Return the paths from the tips of a solid to one of its voxels, as hubs and chains."""
+    from scipy.sparse import csgraph
+
+    centers = solid.centers(solid.voxels)
+    distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
+    levels = LevelSets(paths.steps, distances, solid.spacing)
+    widths = levels.half_widths(centers)
+    least = max(_SHORTEST * solid.spacing * max(solid.inside.shape), _VOXELS * solid.spacing)
+
+    def stays(found: Protrusion) -> bool:
+        width = float(widths[list(found.base)].max())
+        return found.tip - found.junction >= max(_OWN * width, least)
+
+    tips = levels.tips(stays)
+    routes = paths.to(np.array([source]), tips.rows)
+    # From the middle of a ball or plate, level sets are as wide as they are far away; halfway to
+    # the tip of a limb that met no other, they are narrower.
+    kept = []
+    for number, route in enumerate(routes):
+        half = 0.5 * float(distances[route[0]])
+        there = route[int(np.abs(distances[route] - half).argmin())]
+        if tips.stood_out[number] or widths[levels.labels[there]] < half:
+            kept.append(number)
+    outwards = {number: routes[number][::-1] for number in kept}
+    hub_of, hubs = _hubs(outwards, paths.radii, centers, source)
+    members = [[row for row, hub in hub_of.items() if hub == number] for number in range(len(hubs))]
+    places = np.array([centers[rows].mean(axis=0) for rows in members])
+    places[0] = centers[source]
+    middles = levels.middles(centers)
+    chains: list[Chain] = []
+    for number, route in outwards.items():
+        for first, last in _parts(route, hub_of):
+            rows = route[first : last + 1]
+            start, end = hub_of[int(rows[0])], hub_of.get(int(rows[-1]), -1)
+            if end >= 0 and int(rows[-1]) != hubs[end]:
+                continue  # another way to a hub
+            if any(number in chain.tips and chain.end == end for chain in chains):
+                continue
+            beyond = frozenset(
+                k
+                for k, other in outwards.items()
+                if k == number or (end >= 0 and end in {hub_of.get(int(row)) for row in other})
+            )
+            met = [
+                at for at, those in tips.meetings if those & beyond and (those & {*kept}) - beyond
+            ]
+            points = _centred(
+                centers[rows], middles[levels.labels[rows]], widths[levels.labels[rows]]
+            )
+            points[0] = places[start]
+            if end >= 0:
+                points[-1] = places[end]
+            width = max(float(np.median(widths[levels.labels[rows]])), solid.spacing)
+            points = _smooth(points, 2 + int(width / solid.spacing))
+            outside = np.flatnonzero(distances[rows] >= max(met, default=0.0))
+            reached = int(outside[0]) if len(outside) else 0
+            # A chain that is as thick as the hub continues it, as a spine does.
+            thick = float(np.median(paths.radii[rows[reached:]]))
+            if end >= 0 and thick > _NARROWER * paths.radii[hubs[start]]:
+                reached = 0
+            begin = float(arc_lengths(points)[reached])
+            chains.append(Chain(start, end, points, width, begin, beyond))
+    ordered = tuple(sorted(chains, key=lambda chain: chain.start))
+    rows = np.array(hubs, dtype=np.int32)
+    return Tree(places, paths.radii[rows], rows, ordered, tips.rows[kept])
+
+
+def _hubs(
+    outwards: dict[int, Ints], radii: Floats, centers: Floats, source: int
+) -> tuple[dict[int, int], list[int]]:
+    """Return the hub of each voxel where paths part, and the first voxel of each hub."""
+    above, along = {source: source}, {source: 0.0}
+    below: dict[int, set[int]] = {source: set()}
+    for route in outwards.values():
+        rows = route.tolist()
+        for before, row in pairwise(rows):
+            below[before].add(row)
+            if row not in above:
+                above[row], below[row] = before, set()
+                step = centers[row] - centers[before]
+                along[row] = along[before] + float(np.linalg.norm(step))
+    parting = sorted((row for row in below if len(below[row]) > 1), key=lambda row: along[row])
+    hub_of, hubs = {source: 0}, [source]
+    for row in parting:
+        if row == source:
+            continue
+        # In a wide part, several paths may run beside each other.
+        gaps = np.linalg.norm(centers[hubs] - centers[row], axis=1)
+        gaps = gaps / (_REACH * np.maximum(radii[hubs], radii[row]))
+        hub = int(gaps.argmin())
+        if gaps[hub] <= 1.0:
+            hub_of[row] = hub
+        else:
+            hub_of[row] = len(hubs)
+            hubs.append(row)
+    return hub_of, hubs
+
+
+def _parts(route: Ints, hub_of: dict[int, int]) -> Iterator[tuple[int, int]]:
+    """Return the first and last index of each part of a route between different hubs."""
+    found = [index for index, row in enumerate(route.tolist()) if row in hub_of]
+    ends = [*found, len(route) - 1]
+    for first, last in zip(found, ends[1:], strict=True):
+        same = hub_of.get(int(route[last]), -1) == hub_of[int(route[first])]
+        if last > first and not same:
+            yield first, last
+
+
+def _centred(points: Floats, middles: Floats, widths: Floats) -> Floats:
+    """Return a path (K, 3) through the middles of its level sets, unless these are beside it."""
+    near = np.linalg.norm(middles - points, axis=1) <= 0.5 * widths
+    centred: Floats = np.where(near[:, None], middles, points)
+    return centred
+
+
+def _smooth(points: Floats, rounds: int) -> Floats:
+    """Return a path without the corners of voxels; both ends stay."""
+    for _ in range(rounds):
+        inner = 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:]
+        points = np.concatenate([points[:1], inner, points[-1:]])
+    return points
+
+
+def trunk(solid: Solid, paths: Paths, up: Floats) -> int:
+    """Return the voxel in which the skeleton has its root."""
+    centers = solid.centers(solid.voxels)
+    deepest = np.flatnonzero(paths.radii >= paths.radii.max() - 1e-9)
+    middle = centers.mean(axis=0)
+    source = int(deepest[np.linalg.norm(centers[deepest] - middle, axis=1).argmin()])
+    tree = tree_of(solid, paths, source)
+    heights = centers @ up
+    low, high = float(heights.min()), float(heights.max())
+    if len(tree.chains) == 0:
+        return source
+    ends = [int(row) for row in tree.tips]
+    at_source = [chain for chain in tree.chains if chain.start == 0]
+    if len(at_source) == 1:
+        ends.append(source)
+    inside = [_inside_end(solid, paths, end, source) for end in ends]
+    wide = paths.radii[inside]
+    relative = (heights[inside] - wide - low) / max(high - low, solid.spacing)
+    foot = int(relative.argmin())
+    others = np.delete(np.arange(len(ends)), foot)
+    if (
+        relative[foot] <= _FOOT
+        and (relative[others] >= _STANDS).all()
+        and (wide[foot] >= _STEADY * wide[others]).all()
+    ):
+        return inside[foot]
+    if len(ends) == 2:
+        return _thicker_end(solid, paths, ends)
+    # As in the centroid of a tree, with tips as weights; ties go to the wider place.
+    count = len(tree.tips)
+    most = []
+    for hub in range(len(tree.hubs)):
+        beyond = [len(chain.tips) for chain in tree.chains if chain.start == hub]
+        inwards = count - sum(beyond) if hub else 0
+        most.append((max([inwards, *beyond]), -float(tree.radii[hub])))
+    return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
+
+
+def _thicker_end(solid: Solid, paths: Paths, ends: list[int]) -> int:
+    """Return the end of a solid without branches at which its third is thicker."""
+    (route,) = paths.to(np.array(ends[:1]), np.array(ends[1:]))
+    third = max(1, len(route) // 3)
+    first, last = paths.radii[route[:third]].mean(), paths.radii[route[-third:]].mean()
+    here, there = (route[0], route[-1]) if first > last else (route[-1], route[0])
+    return _inside_end(solid, paths, int(here), int(there))
+
+
+def _inside_end(solid: Solid, paths: Paths, tip: int, other: int) -> int:
+    """Return the voxel in the middle of the solid near an end of it."""
+    (route,) = paths.to(np.array([other]), np.array([tip]))
+    if len(route) < 2:
+        return tip
+    lengths = arc_lengths(solid.centers(solid.voxels)[route])
+    radius = float(np.median(paths.radii[route]))
+    near = lengths <= max(2.0 * radius, solid.spacing)
+    return int(route[int(np.where(near, paths.radii[route], -1.0).argmax())])
+
+
+# Joints along chains.
+
+
+def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, bool]:
+    """Return the lengths (N,) along a chain of its joints, the end included; and if it bends."""
+    width = chain.half_width
+    stop = chain.length - (_END * width if chain.end < 0 else 0.0)
+    start = min(chain.begin, stop)
+    first = [start] if start > 0.0 and stop - start >= width else []
+    length = stop - start
+    path = at_lengths(chain.points, np.linspace(start, stop, max(2, int(length / spacing) + 1)))
+    closest = max(_CLOSEST * width, _CLOSEST_PART * length)
+    bends = _bends(path, max(_TOLERANCE * width, _ROUGH * spacing), closest)
+    jointed = _is_jointed(path, bends, _AROUND * max(width, 2.0 * spacing))
+    if jointed:
+        inner = start + arc_lengths(path)[bends] * length / max(arc_lengths(path)[-1], 1e-300)
+    else:
+        # The trunk has a joint where limbs begin, and more only between hubs far apart.
+        count = (length / width) ** _DENSITY / factor
+        bones = max(1, int(count) if chain.end >= 0 else round(count))
+        inner = start + length * np.arange(1, bones) / bones
+    return np.array([*first, *inner, stop]), jointed
+
+
+def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
+    """Return the points at which a path bends: those of a polyline within the tolerance."""
+    found = []
+    todo = [(0, len(path) - 1)]
+    while todo:
+        first, last = todo.pop()
+        chord = path[last] - path[first]
+        inner = path[first + 1 : last] - path[first]
+        if len(inner) == 0:
+            continue
+        along = np.clip(inner @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+        gaps = np.linalg.norm(inner - along[:, None] * chord, axis=1)
+        if gaps.max() > tolerance:
+            middle = first + 1 + int(gaps.argmax())
+            found.append(middle)
+            todo += [(first, middle), (middle, last)]
+    found = sorted(found)
+    lengths = arc_lengths(path)
+    while found:
+        places = np.array([0, *found, len(path) - 1])
+        gaps = np.diff(lengths[places])
+        near = int(gaps.argmin())
+        if gaps[near] < closest:
+            # A smoothed knee is two bends, which count as one; one at an end is none.
+            if 0 < near < len(found):
+                middle = 0.5 * (lengths[places[near]] + lengths[places[near + 1]])
+                found[near - 1] = int(np.abs(lengths - middle).argmin())
+                near = min(near, len(found) - 1)
+            del found[min(near, len(found) - 1)]
+            continue
+        angles = _angles(path[places])
+        weak = int(angles.argmin())
+        if angles[weak] >= _BENT:
+            break
+        del found[weak]
+    return found
+
+
+def _is_jointed(path: Floats, bends: list[int], around: float) -> bool:
+    """Return whether a path consists of straight parts, and not of a curve."""
+    corners = [0, *bends, len(path) - 1]
+    angles = _angles(path[corners])
+    if angles.max(initial=0.0) < _SHARP:
+        return False
+    lengths = arc_lengths(path)
+    sharp = 0.0
+    for before, bend, after, angle in zip(
+        corners, bends, corners[2:], angles.tolist(), strict=False
+    ):
+        # Directions on both sides, without what is near the bend.
+        here = lengths[bend]
+        reach = [min(around, 0.5 * abs(here - lengths[end])) for end in (before, after)]
+        places = [here - 2.0 * reach[0], here - reach[0], here + reach[1], here + 2.0 * reach[1]]
+        near = at_lengths(path, np.array(places))
+        ways = np.stack([near[1] - near[0], near[3] - near[2]])
+        turned = _angles(np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)]))
+        if float(turned[0]) >= _MOST * angle:
+            sharp += angle**2
+    return bool(sharp >= _MOST * (angles**2).sum())
+
+
+def _angles(corners: Floats) -> Floats:
+    """Return the changes of direction at the inner corners of a polyline (K, 3): (K - 2,)."""
+    steps = np.diff(corners, axis=0)
+    ways = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
+    angles: Floats = np.arccos(np.clip((ways[:-1] * ways[1:]).sum(axis=1), -1.0, 1.0))
+    return angles
+
+
+# Symmetry and names.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plane:
+    """A plane of symmetry, and the figure's directions."""
+
+    lateral: Floats
+    """(3,). Normal, to the figure's left."""
+    offset: float
+    up: Floats
+
+    def sides(self, points: Floats) -> Floats:
+        """Return the distances of points (..., 3) from the plane, positive on the left."""
+        found: Floats = points @ self.lateral - self.offset
+        return found
+
+    def mirrored(self, points: Floats) -> Floats:
+        """Return the mirror images of points (..., 3)."""
+        found: Floats = points - 2.0 * self.sides(points)[..., None] * self.lateral
+        return found
+
+
+def paired_chains(tree: Tree, plane: _Plane, spacing: float, size: float) -> dict[int, int]:
+    """Return the chain on the other side of each chain that has one, both ways."""
+    partner: dict[int, int] = {}
+    central = {0}
+    for chain in tree.chains:
+        if chain.end >= 0 and chain.start in central and _is_central(chain, plane, spacing):
+            central.add(chain.end)
+    todo = [(central, central)]
+    while todo:
+        ours, theirs = todo.pop()
+        near = {}
+        for number, chain in enumerate(tree.chains):
+            is_side = not _is_central(chain, plane, spacing)
+            if number not in partner and is_side and chain.start in ours | theirs:
+                near[number] = _as_limb(chain, plane)
+        positive = np.array(
+            [plane.sides(limb.points[0]) > 0.0 for limb in near.values()], dtype=np.bool_
+        )
+        if ours is not theirs:
+            # Beyond a pair of limbs, those of the left one belong to the left.
+            positive = np.array([tree.chains[number].start in ours for number in near])
+        number_of = {id(limb): number for number, limb in near.items()}
+        for pair in paired(list(near.values()), positive, plane.lateral, plane.offset, size):
+            left, right = (number_of[id(limb)] for limb in pair.limbs)
+            partner[left], partner[right] = right, left
+            a, b = tree.chains[left].end, tree.chains[right].end
+            if a >= 0 and b >= 0:
+                todo.append(({a}, {b}))
+    return partner
+
+
+def _is_central(chain: Chain, plane: _Plane, spacing: float) -> bool:
+    points = at_lengths(chain.points, np.linspace(chain.begin, chain.length, _SAMPLES))
+    apart = float(np.abs(plane.sides(points)).max())
+    return apart <= _CENTRAL * max(chain.half_width, spacing)
+
+
+def _as_limb(chain: Chain, plane: _Plane) -> Limb:
+    """Return a chain as a limb from its tip to the trunk, attached in the plane of symmetry."""
+    points = chain.points[::-1]
+    start = at_lengths(chain.points, np.array([chain.begin]))[0]
+    attachment = start - plane.sides(start) * plane.lateral
+    radii = np.full(len(points), chain.half_width)
+    return Limb(points, radii, attachment, chain.length - chain.begin)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveSkeleton:
+    """A skeleton found in a mesh."""
+
+    figure: Figure
+    """The skeleton, without a mesh."""
+    lines: tuple[Diagnostic, ...]
+    """Messages for the user."""
+
+
+def find_skeleton(
+    source: Figure, target: Mesh, how: SkeletonSettings, alignment: AlignmentSettings
+) -> CurveSkeleton:
+    """Return the skeleton of a figure's mesh; ``RigError`` if it is no single solid.
+
+    ``alignment``: up axis and front, if they are known. ``target``: the mesh in the current pose.
+    """
+    if target.n_triangles == 0:
+        raise RigError("expected a target with triangles, found none")
+    named = alignment.up or source.up
+    # Any axis beside the up axis is a front; the usual ones are those of figures.
+    usual = "z" if named[-1] == "y" else "x"
+    front = alignment.facing or usual
+    axis_rotations(source.up, named, front)  # checks the names
+    with part_of_work(span=(0.0, 0.4)):
+        solid = solid_within(target.positions, target.triangles, _FINEST)
+    _check_one(target, solid)
+    with part_of_work(span=(0.4, 1.0)):
+        found = joints_in(
+            solid,
+            axis_direction(named),
+            axis_direction(front),
+            how,
+            is_facing_known=alignment.facing is not None,
+        )
+    names, parents, places = found.names, found.parents, found.positions
+    figure = Figure(
+        name=source.name,
+        skeleton=ball_skeleton(names, parents, places),
+        up="z" if named == "z" else "y" if named == "y" else source.up,
+        unit=source.unit,
+    )
+    return CurveSkeleton(figure, tuple(_lines(found, front, alignment.facing is None)))
+
+
+def _check_one(target: Mesh, solid: Solid) -> None:
+    """Raise ``RigError`` if a mesh consists of parts far from each other."""
+    used = np.unique(target.triangles)
+    apart = solid.gaps(target.positions[used]) > _APART * solid.spacing
+    if apart.mean() > _FEW:
+        raise RigError(
+            f"expected one object, found parts far from the largest one: {int(apart.sum())} of "
+            f"{counted(len(used), 'vertex')}; rig each object alone"
+        )
+
+
+def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
+    """Return messages about the joints, their symmetry and the front."""
+    if len(found.names) == 1:
+        yield note("R016.no-limbs: no limbs found: one joint moves the whole mesh")
+        return
+    limbs = counted(found.limbs, "limb") if found.limbs else Phrase("the trunk only")
+    yield note(
+        "R015.skeleton: skeleton found in the mesh: {n}, {limbs}, {pairs} mirrored",
+        n=counted(len(found.names), "joint"),
+        limbs=limbs,
+        pairs=counted(found.pairs, "pair"),
+    )
+    if found.missed > _MISSED:
+        yield note(
+            "R016.loops: {missed:.0%} of the mesh is far from the skeleton: loops and wide sheets "
+            "have no joints of their own",
+            missed=found.missed,
+        )
+    if found.pairs and is_assumed:
+        yield note(
+            "R015.front: left and right, and numbers from front to back: assuming that the front "
+            "is {front}",
+            front=f"{'-' * front.startswith('-') or '+'}{front[-1]}",
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joints:
+    """Joints found in a solid."""
+
+    names: tuple[str, ...]
+    parents: Ints
+    """(J,). -1 for the root, which is the first."""
+    positions: Floats
+    """(J, 3)."""
+    limbs: int
+    """Number of limbs that begin at the trunk."""
+    pairs: int
+    """Number of pairs of them that mirror each other."""
+    missed: float
+    """Fraction of the solid that is far from the skeleton."""
+
+
+def joints_in(
+    solid: Solid, up: Floats, front: Floats, how: SkeletonSettings, is_facing_known: bool
+) -> Joints:
+    """Return the joints of a solid; ``up``, ``front``: (3,), its directions."""
+    report_fraction(0.0, "looking for limbs")
+    paths = Paths(solid)
+    root = trunk(solid, paths, up)
+    report_fraction(0.4)
+    tree = tree_of(solid, paths, root)
+    if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
+        raise RigError("expected a solid with limbs, found a sheet without thickness")
+    report_fraction(0.8, "placing joints")
+    plane, partner = _symmetry_of(solid, tree, up, front, how.symmetry)
+    points = _joint_points(tree, plane, partner, solid.spacing, how.joint_spacing)
+    heights = solid.centers(solid.voxels) @ up
+    low = float(heights.min()) + _ON_GROUND * float(np.ptp(heights))
+    labels = _Names(tree, plane, partner, front if is_facing_known else None)
+    chain_names = labels.of_chains(up, low, front)
+    names, parents, places = ["root"], [-1], [_on(plane, tree.hubs[0])]
+    joint_of = {0: 0}
+    for chain, name, own in zip(tree.chains, chain_names, points, strict=True):
+        above = joint_of[chain.start]
+        for index, place in enumerate(own):
+            ending = f"_{index + 1}" if index else ""
+            if name == _TRUNK:
+                ending = f"_{sum(each.startswith(_TRUNK) for each in names) + 1}"
+            elif chain.end < 0 and index and index + 1 == len(own):
+                ending = "_end"
+            names.append(name + ending)
+            parents.append(above)
+            places.append(place)
+            above = len(names) - 1
+        if chain.end >= 0:
+            joint_of[chain.end] = above
+    return Joints(
+        tuple(names),
+        np.array(parents, dtype=np.int32),
+        np.array(places),
+        labels.limbs,
+        labels.pairs,
+        _missed(solid, tree),
+    )
+
+
+def _missed(solid: Solid, tree: Tree) -> float:
+    """Return the fraction of a solid that is far from all chains, such as one side of a ring."""
+    from scipy import spatial
+
+    if len(tree.chains) == 0:
+        return 0.0
+    points = [tree.hubs, *(chain.points for chain in tree.chains)]
+    widths = [2.0 * tree.radii, *(np.full(len(c.points), c.half_width) for c in tree.chains)]
+    centers = solid.centers(solid.voxels)
+    gaps, nearest = spatial.cKDTree(np.concatenate(points)).query(centers)
+    # Inside the trunk, the nearest point may be that of a thin limb.
+    wide = np.maximum(_FAR * np.concatenate(widths)[nearest], _FAR * float(solid.radii().max()))
+    return float((gaps > wide).mean())
+
+
+def _symmetry_of(
+    solid: Solid, tree: Tree, up: Floats, front: Floats, symmetry: str
+) -> tuple[_Plane | None, dict[int, int]]:
+    """Return the plane of symmetry, None without one, and the pairs of chains."""
+    plane, fraction = _plane_of(solid, up, front, symmetry)
+    if plane is None:
+        return None, {}
+    size = solid.spacing * max(solid.inside.shape)
+    partner = paired_chains(tree, plane, solid.spacing, size)
+    if symmetry == "auto" and fraction < _SYMMETRIC:
+        ends = [number for number, chain in enumerate(tree.chains) if chain.end < 0]
+        if 2 * sum(number in partner for number in ends) < len(ends):
+            return None, {}
+    return plane, partner
+
+
+def _plane_of(
+    solid: Solid, up: Floats, front: Floats, symmetry: str
+) -> tuple[_Plane | None, float]:
+    """Return the plane of symmetry, None without one, and the fraction that it mirrors."""
+    if symmetry == "none":
+        return None, 0.0
+    given = None if symmetry == "auto" else np.eye(3)["xyz".index(symmetry)]
+    lateral, offset, fraction = sagittal_plane(solid, up, given)
+    if given is None and fraction < _POSED:
+        return None, fraction
+    left = np.cross(up, front)
+    if abs(float(lateral @ left)) < _ASKEW:
+        # The figure faces along another horizontal axis; which way is not known.
+        left = lateral if float(lateral @ np.ones(3)) >= 0.0 else -lateral
+    if float(lateral @ left) < 0.0:
+        lateral, offset = -lateral, -offset
+    return _Plane(lateral, offset, up), fraction
+
+
+def _on(plane: _Plane | None, points: Floats) -> Floats:
+    """Return points (..., 3) moved to the plane of symmetry, if there is one."""
+    if plane is None:
+        return points
+    found: Floats = points - plane.sides(points)[..., None] * plane.lateral
+    return found
+
+
+def _joint_points(
+    tree: Tree, plane: _Plane | None, partner: dict[int, int], voxel: float, factor: float
+) -> list[Floats]:
+    """Return the joints of each chain, without the first hub and with the last one: (N, 3)."""
+    found = [np.zeros((0, 3))] * len(tree.chains)
+    for number, chain in enumerate(tree.chains):
+        other = partner.get(number)
+        if other is not None and other < number:
+            continue
+        fractions, bends = _fractions(chain, voxel, factor)
+        path = at_lengths(chain.points, np.linspace(chain.begin, chain.length, _SAMPLES))
+        if other is None:
+            if plane is not None and _is_central(chain, plane, voxel):
+                path = _on(plane, path)
+            found[number] = at_lengths(path, fractions * arc_lengths(path)[-1])
+            continue
+        assert plane is not None  # only a plane of symmetry has two sides
+        twin = tree.chains[other]
+        theirs, they_bend = _fractions(twin, voxel, factor)
+        there = at_lengths(twin.points, np.linspace(twin.begin, twin.length, _SAMPLES))
+        gap = float(np.linalg.norm(path - plane.mirrored(there), axis=1).max())
+        is_mirrored = gap <= _MIRRORED * max(chain.half_width, twin.half_width, voxel)
+        if len(fractions) != len(theirs):
+            # Bends that are seen on one side only are bends of both.
+            if bends == they_bend:
+                bends = len(fractions) > len(theirs)
+            fractions = theirs = fractions if bends else theirs
+        elif is_mirrored:
+            fractions = theirs = 0.5 * (fractions + theirs)
+        if is_mirrored:
+            path = 0.5 * (path + plane.mirrored(there))
+            there = plane.mirrored(path)
+        found[number] = at_lengths(path, fractions * arc_lengths(path)[-1])
+        found[other] = at_lengths(there, theirs * arc_lengths(there)[-1])
+    return found
+
+
+def _fractions(chain: Chain, voxel: float, factor: float) -> tuple[Floats, bool]:
+    """Return ``joint_lengths`` from 0 where a chain leaves its hub to 1 at its end."""
+    lengths, bends = joint_lengths(chain, voxel, factor)
+    lengths = np.maximum(lengths - chain.begin, 0.0)
+    return lengths / max(chain.length - chain.begin, 1e-300), bends
+
+
+class _Names:
+    """Names of chains: trunk, leg, limb, head and tail, with numbers and sides.
+
+    ``leg_1_left`` mirrors ``leg_1_right``; ``leg_1_a_left`` is the first branch at its end.
+    """
+
+    def __init__(
+        self, tree: Tree, plane: _Plane | None, partner: dict[int, int], front: Floats | None
+    ) -> None:
+        self._chains, self._plane, self._partner, self._front = tree.chains, plane, partner, front
+        self._names: dict[int, str] = {}
+        self.limbs = self.pairs = 0
+
+    def of_chains(self, up: Floats, low: float, front: Floats) -> list[str]:
+        """Return the names; tips of legs are below the height ``low``."""
+        hubs, top = {0}, []
+        for number, chain in enumerate(self._chains):
+            if chain.start not in hubs:
+                continue
+            if chain.end >= 0 and chain.begin == 0.0 and number not in self._partner:
+                self._names[number] = _TRUNK
+                hubs.add(chain.end)
+            else:
+                top.append(number)
+        units = self._units(top, front)
+        words = [self._word(unit, up, low) for unit in units]
+        counts = {word: words.count(word) for word in words}
+        used: dict[str, int] = {}
+        for unit, word in zip(units, words, strict=True):
+            used[word] = used.get(word, 0) + 1
+            # Numbers of equal width, so that no name is another one with a digit appended.
+            place = f"{used[word]:0{len(str(counts[word]))}}"
+            self._assign(unit, word if word in ("head", "tail") else f"{word}_{place}", front)
+            self.limbs += len(unit)
+            self.pairs += len(unit) == 2
+        return [self._names[number] for number in range(len(self._chains))]
+
+    def _units(self, numbers: list[int], front: Floats) -> list[tuple[int, ...]]:
+        """Return pairs (left, right) and single chains, from front to back."""
+        found: list[tuple[int, ...]] = []
+        for number in numbers:
+            other = self._partner.get(number)
+            if other is None or other not in numbers:
+                found.append((number,))
+            elif self._is_left(number, other):
+                found.append((number, other))
+
+        def place(unit: tuple[int, ...]) -> tuple[bool, float]:
+            middles = [self._chains[number].points.mean(axis=0) for number in unit]
+            return len(unit) == 1, -float(np.mean(middles, axis=0) @ front)
+
+        return sorted(found, key=place)
+
+    def _is_left(self, number: int, other: int) -> bool:
+        assert self._plane is not None  # only a plane of symmetry has two sides
+        sides = [float(self._plane.sides(self._chains[k].points).mean()) for k in (number, other)]
+        return sides[0] > sides[1]
+
+    def _word(self, unit: tuple[int, ...], up: Floats, low: float) -> str:
+        tips = [self._chains[number].points[-1] for number in unit]
+        if len(unit) == 2:
+            return "leg" if all(float(tip @ up) <= low for tip in tips) else "limb"
+        chain = self._chains[unit[0]]
+        if self._front is None or self._plane is None or not self.pairs_exist:
+            return "limb"
+        # With a known front, what is ahead of the trunk or behind it has a name.
+        ahead = chain.points[-1] - chain.points[0]
+        along = float(ahead @ self._front) / max(float(np.linalg.norm(ahead)), 1e-300)
+        is_single = sum(
+            1
+            for number, other in enumerate(self._chains)
+            if number not in self._partner
+            and other.end < 0
+            and float((other.points[-1] - other.points[0]) @ self._front) * along > 0.0
+        )
+        if abs(along) < _ASKEW or is_single != 1:
+            return "limb"
+        return "head" if along > 0.0 else "tail"
+
+    @property
+    def pairs_exist(self) -> bool:
+        """Whether any limbs are paired."""
+        return len(self._partner) > 0
+
+    def _assign(self, unit: tuple[int, ...], stem: str, front: Floats) -> None:
+        """Name a chain or a pair, and the branches at its end."""
+        sides = ("_left", "_right") if len(unit) == 2 else ("",)
+        for number, side in zip(unit, sides, strict=True):
+            self._names[number] = stem + side
+        ends = {self._chains[number].end for number in unit} - {-1}
+        below = [number for number, chain in enumerate(self._chains) if chain.start in ends]
+        for index, branch in enumerate(self._units(below, front)):
+            letter = chr(ord("a") + index) if index < 26 else str(index)
+            if len(unit) == 2 and len(branch) == 1:
+                # A branch on one side only still belongs to that side.
+                side = sides[
+                    [self._chains[k].end for k in unit].index(self._chains[branch[0]].start)
+                ]
+                self._assign_one_sided(branch[0], f"{stem}_{letter}", side, front)
+            else:
+                self._assign(branch, f"{stem}_{letter}", front)
+
+    def _assign_one_sided(self, number: int, stem: str, side: str, front: Floats) -> None:
+        """Name a chain without a counterpart on a paired limb, and its branches."""
+        self._names[number] = stem + side
+        below = [
+            k for k, chain in enumerate(self._chains) if chain.start == self._chains[number].end
+        ]
+        for index, branch in enumerate(below):
+            self._assign_one_sided(branch, f"{stem}_{index + 1}", side, front)
