@@ -256,6 +256,23 @@ def test_finding_in_a_clip_jumps_to_its_time(lint):
     assert not hand.state.history.can_undo
 
 
+def test_fix_is_one_step_of_undo_and_is_checked_again(lint):
+    """The weight of 0.9 becomes 1: the vertex returns from (-0.9, 0.9, 0.9) to (-1, 1, 1)."""
+    hand = lint(LIGHT)
+    assert "W001" in codes(hand)
+    hand.click("Fix")
+    hand.state.job.wait()
+    hand.step(3)
+    finish(hand)
+    assert "W001" not in codes(hand)
+    skin = hand.state.scene.actors[0].figure.skin
+    assert skin.weights[skin.starts[5]] == 1.0
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert hand.state.scene.actors[0].figure is LIGHT
+    assert not hand.state.history.can_undo
+
+
 def test_captured_points_are_marked(lint):
     figure, clip = keypoints()
     points = clip.points.copy()

@@ -297,9 +297,10 @@ def _have_same_motion(one: SceneVersion, other: SceneVersion) -> bool:
     return a == b
 
 
-def _rig(one: ActorVersion) -> tuple[object, object]:
-    """Return the parts of a figure that edits of its joints replace."""
-    return one.figure.skeleton, one.figure.skin
+def _rig(one: ActorVersion) -> tuple[object, ...]:
+    """Return the parts of a figure that edits of its joints, or fixes of its faults, replace."""
+    figure = one.figure
+    return figure.skeleton, figure.skin, figure.mesh, figure.animations
 
 
 def _restore_rigs(here: SceneVersion, there: SceneVersion) -> None:

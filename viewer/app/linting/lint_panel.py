@@ -29,6 +29,7 @@ from viewer.app.layout import show_panel
 from viewer.app.playback.animations import choose_animation
 from viewer.app.view.picks import take_pick
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
 from viewer.linting import (
     SEVERITIES,
     Finding,
@@ -40,6 +41,7 @@ from viewer.linting import (
     worst_first,
 )
 from viewer.linting.captures import LOW_FRACTION, LOW_FRAMES
+from viewer.linting.fixes import FIXES, fix_scene
 from viewer.phrases import counted, printable
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rendering.picking import Pick
@@ -63,6 +65,7 @@ _LIMITS_WIDTH = 24.0  # width of the limits, in font sizes
 _FASTEST = 100.0  # highest speed that can be set, units per second
 _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 _TITLE = "Checking the rig"
+_FIXING = "Fixing the rig"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +116,8 @@ class Linting:
     """Index of the chosen finding, -1 for none."""
     wants_aim: bool = False
     """Whether the camera moves to the chosen finding once the scene is posed."""
+    wants_check: bool = False
+    """Whether the scene is checked as soon as no job runs: faults were fixed."""
     is_edited: bool = False
     """Whether a moving actor was posed by hand since the check."""
     seen: tuple[PosedFor | None, SceneVersion] | None = None
@@ -137,13 +142,20 @@ def draw(state: AppState) -> None:
     """Draw the panel; when it is first shown, it starts a check."""
     view = state.of(Linting)
     _take_findings(state)
-    if not view.was_shown:
-        view.was_shown = True
+    if not view.was_shown or (view.wants_check and state.job is None):
+        view.was_shown, view.wants_check = True, False
         start_check(state)
     known = view.checked
     if button(state, "Check" if known is None else "Recheck", no_job_room(state)):
         start_check(state)
     explain("check rigs, meshes and motions in their current state, and the files")
+    same_line_if_room("Fix")
+    if button(state, "Fix", no_job_room(state) or _nothing_to_fix(view)):
+        _start_fixing(state)
+    explain(
+        "fix what has a fix in the open scene, such as stray weights and pops; files stay as they "
+        "are, and undo restores the scene"
+    )
     same_line_if_room("Limits…")
     if button(state, "Limits…"):
         imgui.open_popup("lint limits")
@@ -397,6 +409,40 @@ def start_check(state: AppState) -> None:
 
     running.job = state.job = ThreadJob(_TITLE, check)
     state.of(Linting).running = running
+
+
+def _nothing_to_fix(view: Linting) -> str:
+    """Return the reason why nothing can be fixed."""
+    if view.checked is None:
+        return "check the scene first"
+    has_fix = any(
+        one.code in FIXES and one.actor is not None and one.severity != "note"
+        for one in view.checked.findings
+    )
+    return "" if has_fix else "no error or warning has a fix"
+
+
+def _start_fixing(state: AppState) -> None:
+    """Fix a copy of the scene in a thread; its figures and motions then replace those shown."""
+    source, options = state.scene, _options(state)
+    copy, before = copied(source), [(one.figure, one.clip) for one in source.actors]
+    notes: list[Diagnostic] = []
+
+    def fix() -> list[str]:
+        notes.extend(fix_scene(copy, (), options).notes)
+        return []
+
+    def show() -> None:
+        if state.scene is not source or len(source.actors) != len(before):
+            return  # other files were opened meanwhile
+        for actor, fixed, (figure, clip) in zip(source.actors, copy.actors, before, strict=True):
+            if actor.figure is figure and actor.clip is clip:
+                actor.figure, actor.clip = fixed.figure, fixed.clip
+        state.say(*notes)
+        state.say_status(f"Fixed: {counted(len(notes), 'change')}")
+        state.of(Linting).wants_check = True
+
+    state.job = ThreadJob(_FIXING, fix, show)
 
 
 def _options(state: AppState) -> LintOptions:
