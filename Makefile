@@ -3,7 +3,7 @@
 #   make test   run all tests
 #   make quick  run the tests that do not draw, start programs or compute for long: about a minute
 # Others: make lint, make house, make record TO=FOLDER, make bench, make golden [NAME...],
-# make manual, make gallery, make figure, make clean.
+# make notebooks, make manual, make gallery, make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -25,7 +25,7 @@ $(PICTURES): ; @:
 endif
 
 .PHONY: run test suite quick lint style types house record compiled bench golden manual gallery
-.PHONY: figure system clean
+.PHONY: notebooks figure system clean
 
 # A window may open even if pictures cannot be drawn without one, so failures are ignored here.
 run: $(READY)
@@ -77,6 +77,10 @@ golden: $(READY) system
 	@VIEWER_UPDATE_GOLDEN="$(or $(PICTURES),all)" $(TESTING) -q tests/rendering tests/app
 
 # Regenerates the reference tables of the manual from the registries.
+# Executes the notebooks of viewer/examples, and stores them with their outputs.
+notebooks: $(READY)
+	@$(BIN)/python tests/notebooks.py $(NAMES)
+
 manual: $(READY)
 	@$(BIN)/python tests/manual/reference.py
 
