@@ -8,8 +8,10 @@ from app.tiny import SKEL, skin_text
 from imgui_bundle import imgui
 from numpy.testing import assert_array_equal
 
+import viewer
 from viewer.app.preferences.preferences import Appearance
 from viewer.app.weights.weights_panel import no_view, start_heat_map, toggle_weights
+from viewer.plugins import Plugin
 from viewer.rendering.colors import colormap
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.scalars import (
@@ -177,6 +179,31 @@ def choose(hand, name):
     hand.step(2)
     hand.click(f"view {name}")
     hand.step(2)
+
+
+@pytest.fixture
+def _plugins(monkeypatch):
+    """Two plug-ins, one of which cannot be imported."""
+    found = (
+        Plugin("scalars", "bad", "no_such_module", "broken 1.0"),
+        Plugin("scalars", "height", "viewer.plugin_template.scalars:HEIGHT", "mine 0.1"),
+    )
+    monkeypatch.setattr("viewer.plugins._installed", lambda group: found)
+    monkeypatch.setattr("viewer.rigs.scalars._PLUGGED", {})
+    yield
+    SCALARS.pop("height", None)
+
+
+@pytest.mark.usefixtures("_plugins")
+def test_quantity_of_a_plugin_is_chosen_from_the_list(wide):
+    choose(wide, "height")
+    assert wide.state.options.scalar == "height" and wide.state.error == ""
+    low, high = wide.state.stats.scalar_range
+    heights = viewer.deform(wide.state.actor.figure, wide.state.actor.pose)[0][:, 1]
+    assert low == 0.0 and high == pytest.approx(np.ptp(heights), rel=1e-5)
+    choose(wide, "bad")
+    assert wide.state.error.startswith("plug-in broken 1.0 (scalars bad): cannot be imported")
+    assert wide.state.options.scalar == "height"
 
 
 def test_greyed_view_shows_the_reason(wide, tooltips):

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
 from viewer.app.core.reasons import no_mesh
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.text_fields import number_field
 from viewer.app.core.widgets import (
     button,
@@ -39,6 +39,7 @@ from viewer.rigs.number_text import short_number
 from viewer.rigs.pose import pose_key
 from viewer.rigs.scalars import (
     SCALARS,
+    find_quantity,
     informative_quantity,
     joint_influences,
     joint_text,
@@ -48,6 +49,7 @@ from viewer.rigs.scalars import (
     most_influential,
     shown_unit,
     split_name,
+    unused_plugins,
 )
 
 _LONGEST = 40  # maximum length of a name in characters
@@ -165,7 +167,19 @@ def _draw_views(state: AppState) -> None:
                 show_scalar(state, state.options.scalar if name == key else name)
             note_item(state, f"view {name}")
             explain("", why)
+    for plugin in unused_plugins():
+        with disabled(state, no_mesh(state)):
+            if imgui.selectable(f"{plugin.name} ({plugin.distribution})", False)[0]:
+                _show_plugin(state, plugin.name)
+            note_item(state, f"view {plugin.name}")
     imgui.end_combo()
+
+
+@shows_errors
+def _show_plugin(state: AppState, name: str) -> None:
+    """Show a plug-in's quantity, whose module is now imported."""
+    find_quantity(name)
+    show_scalar(state, name)
 
 
 def _draw_joint(state: AppState) -> None:

@@ -160,6 +160,13 @@ def _find_plugin(key: str) -> None:
     SCALARS[key] = _Quantity(found.title, "", "a mesh", found.kind, found.unit)
 
 
+def unused_plugins() -> list[Plugin]:
+    """Return the plug-ins whose quantities have not been used, for menus."""
+    from viewer.plugins import plugins_of
+
+    return [found for found in plugins_of("scalars") if found.name not in SCALARS]
+
+
 def _plugged_values(
     plugin: Plugin, quantity: Scalar, figure: Figure, pose: Pose | None, skinning: Skinning
 ) -> Floats:
