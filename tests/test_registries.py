@@ -1,5 +1,6 @@
 """Each registry lists exactly the modules of its folder, and its entries can be loaded."""
 
+import pydoc
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -98,3 +99,11 @@ def test_public_names_exist_and_are_documented():
     for name in viewer.__all__:
         value = getattr(viewer, name)
         assert value.__doc__ and value.__doc__.strip(), name
+
+
+def test_help_begins_with_an_overview():
+    """Without the packages that some functions need, too: only calls import them."""
+    text = pydoc.plain(pydoc.render_doc(viewer))
+    first = text.partition("DESCRIPTION")[2]
+    assert "viewer.load(" in first[:300] and "retarget, clean, rig" in first[:1200]
+    assert "widget(scene" in text and "class Findings" in text

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from viewer.commands._exports import export
     from viewer.commands._pictures import render, video
     from viewer.commands._retarget import retarget
+    from viewer.commands._widget import widget
     from viewer.commands.diff import Comparison, diff
     from viewer.commands.lint import Findings, lint
     from viewer.commands.rig import rig
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from viewer.formats import write
     from viewer.loading import load
     from viewer.loading.own_arrays import animate, figure
-    from viewer.notebook_widget import widget
     from viewer.rendering.camera import Camera
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rigs.blendshapes import BlendShapes
@@ -175,7 +175,7 @@ _HOMES = {
     "shaped": "rigs.shape",
     "show": "app.window",
     "video": "commands._pictures",
-    "widget": "notebook_widget",
+    "widget": "commands._widget",
     "with_rest_mesh": "rigs.shape",
     "write": "formats",
 }

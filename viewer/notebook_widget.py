@@ -8,24 +8,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import anywidget
 import numpy as np
+import traitlets
 
 from viewer.errors import ViewerError
 from viewer.notebook import page_of, picture
 from viewer.rigs.arrays import Floats
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene, scene_of
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import find_joint
 from viewer.rigs.skinning import Skinning
-
-try:
-    import anywidget
-    import traitlets
-except ModuleNotFoundError as missing:
-    raise ViewerError(
-        "viewer.widget: expected the package anywidget, found none: "
-        "pip install 'skinning-viewer[notebook]'"
-    ) from missing
 
 
 class SceneWidget(anywidget.AnyWidget):
@@ -145,31 +138,3 @@ def _centers(page: str) -> list[Floats]:
     assert found is not None  # every page has a header
     meshes = [figure.get("mesh") or {} for figure in json.loads(found[1])["figures"]]
     return [np.array(mesh.get("center", [0.0, 0.0, 0.0])) for mesh in meshes]
-
-
-def widget(
-    scene: Scene | Actor, skinning: Skinning | None = None, *, height: int = 420
-) -> SceneWidget:
-    """Show a scene in a notebook, and follow its poses, its time, its camera and its selection.
-
-    Parameters
-    ----------
-    scene : Scene or Actor
-        What is shown, with its motions.
-    skinning : Skinning, optional
-        Skinning method and options.
-    height : int
-        Height of the view, pixels.
-
-    Returns
-    -------
-    SceneWidget
-        The widget, as the last expression of a cell. ``widget["name"].pose = pose`` shows a pose
-        at once; ``time``, ``camera`` and ``selection`` can be set and read.
-
-    Raises
-    ------
-    ViewerError
-        If the package anywidget is not installed.
-    """
-    return SceneWidget(scene_of(scene, "widget"), skinning, height)

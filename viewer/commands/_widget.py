@@ -1,0 +1,47 @@
+"""``viewer.widget``, whose package is needed only when it is called."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from viewer.errors import ViewerError
+from viewer.rigs.scene import Actor, Scene, scene_of
+from viewer.rigs.skinning import Skinning
+
+if TYPE_CHECKING:
+    from viewer.notebook_widget import SceneWidget
+
+
+def widget(
+    scene: Scene | Actor, skinning: Skinning | None = None, *, height: int = 420
+) -> SceneWidget:
+    """Show a scene in a notebook, and follow its poses, its time, its camera and its selection.
+
+    Parameters
+    ----------
+    scene : Scene or Actor
+        What is shown, with its motions.
+    skinning : Skinning, optional
+        Skinning method and options.
+    height : int
+        Height of the view, pixels.
+
+    Returns
+    -------
+    SceneWidget
+        The widget, as the last expression of a cell. ``widget["name"].pose = pose`` shows a pose
+        at once; ``time``, ``camera`` and ``selection`` can be set and read.
+
+    Raises
+    ------
+    ViewerError
+        If the package anywidget is not installed.
+    """
+    try:
+        from viewer.notebook_widget import SceneWidget
+    except ModuleNotFoundError as missing:
+        raise ViewerError(
+            f"viewer.widget: expected the package anywidget, found no {missing.name}: "
+            "pip install 'skinning-viewer[notebook]'"
+        ) from missing
+    return SceneWidget(scene_of(scene, "widget"), skinning, height)
