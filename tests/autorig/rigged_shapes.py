@@ -104,3 +104,15 @@ def united(*parts):
     starts = np.cumsum([0, *(len(part[0]) for part in parts)])
     triangles = [part[1] + start for part, start in zip(parts, starts, strict=False)]
     return np.concatenate([part[0] for part in parts]), np.concatenate(triangles)
+
+
+KNEES = {"leg_1": [(0.2, 0.5, 0.25), (0.8, 0.9, 0.7), (1.1, 0.02, 1.0)],
+         "leg_2": [(0.2, 0.5, -0.25), (0.9, 0.9, -0.6), (1.3, 0.02, -0.9)]}  # fmt: skip
+TRUNK = pipe([(0, 0.5, -0.45), (0, 0.5, 0.45)], 0.25)
+
+
+def beast(left=KNEES, right=KNEES):
+    """Return a trunk along z with two pairs of legs that bend once."""
+    legs = [pipe(corners, 0.05) for corners in left.values()]
+    legs += [pipe(np.multiply(corners, [-1, 1, 1]), 0.05) for corners in right.values()]
+    return united(TRUNK, *legs)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from autorig.rigged_shapes import mesh_of, pipe, turn, united
+from autorig.rigged_shapes import KNEES, TRUNK, beast, mesh_of, pipe, turn, united
 from numpy.testing import assert_allclose
 
 import viewer
@@ -16,17 +16,6 @@ from viewer.exporters import export
 from viewer.progress import Cancelled, receiving
 from viewer.rigs.figure import Figure
 from viewer.rigs.scene import Actor
-
-KNEES = {"leg_1": [(0.2, 0.5, 0.25), (0.8, 0.9, 0.7), (1.1, 0.02, 1.0)],
-         "leg_2": [(0.2, 0.5, -0.25), (0.9, 0.9, -0.6), (1.3, 0.02, -0.9)]}  # fmt: skip
-TRUNK = pipe([(0, 0.5, -0.45), (0, 0.5, 0.45)], 0.25)
-
-
-def beast(left=KNEES, right=KNEES):
-    """Return a trunk along z with two pairs of legs that bend once."""
-    legs = [pipe(corners, 0.05) for corners in left.values()]
-    legs += [pipe(np.multiply(corners, [-1, 1, 1]), 0.05) for corners in right.values()]
-    return united(TRUNK, *legs)
 
 
 def found(shape, facing=None, up=None, **how):

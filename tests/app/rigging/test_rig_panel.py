@@ -9,7 +9,7 @@ from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.test_panel_pictures import _compare, _shown
 from app.tiny import write_rig
-from autorig.rigged_shapes import arm
+from autorig.rigged_shapes import arm, beast, mesh_of
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
@@ -440,3 +440,31 @@ def test_joints_bend_one_after_another_and_return(tmp_path):
         posed = pose.copy()
         sample(clip, skeleton, time, posed)
         np.testing.assert_allclose(posed.dofs, pose.dofs, atol=1e-12)
+
+
+def test_skeleton_is_found_in_the_shape_with_the_chosen_settings(drive, texts, monkeypatch):
+    monkeypatch.setattr("viewer.autorig.curve_skeleton._FINEST", 96)
+    target = Actor(Figure("beast", mesh_of(*beast())))
+    hand = drive(scene=Scene([target]), size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    hand.pick("Template", 2)  # below the bundled figures
+    hand.step(2)
+    assert "for what is no person and no quadruped" in " ".join(texts)
+    for label in ("Align", "Pose it…"):  # nothing to align or to pose
+        hand.click(label)
+        assert hand.state.job is None
+    hand.pick("Facing##shape", 6)
+    hand.click("Run")
+    hand.finish_job()
+    state = hand.state
+    assert state.error == ""
+    (result,) = state.of(Rigging).results.values()
+    skeleton = result.rigged.figure.skeleton
+    knee = skeleton.names.index("leg_1_left_2")
+    # The front is -z, so that left is -x.
+    place = viewer.rigs.kinematics.world_matrices(skeleton, rest_pose(skeleton))[knee, :3, 3]
+    assert place[0] < -0.5 and place[2] < -0.5
+    assert "2 pairs mirrored" in str(result.rigged.lines[0])
+    assert result.method == "heat" and visible(hand) == ["beast bound"]
+    assert_allclose(seen(hand, 1), target.figure.mesh.positions, atol=1e-9)

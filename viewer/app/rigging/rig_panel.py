@@ -40,6 +40,7 @@ from viewer.app.rigging.placing import (
 from viewer.app.rigging.results import MATCH_COLORS, draw_results, show_colors
 from viewer.app.rigging.rigging import (
     GHOSTS,
+    SHAPE,
     TOOLS,
     RigChoices,
     Rigging,
@@ -49,6 +50,7 @@ from viewer.app.rigging.rigging import (
     compared_methods,
     current_template,
     method_now,
+    methods_now,
     no_placing,
     no_target,
     refresh,
@@ -114,6 +116,10 @@ def draw(state: AppState) -> None:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
     if _section("Edit skeleton", "joints placed and moved by hand"):
         joint_editing.draw_section(state)
+    if rigging.template_key == SHAPE:
+        with disabled(state, why):
+            if _section("Shape", "a skeleton is found in the shape of the target"):
+                _draw_shape(state)
     with disabled(state, why or no_placing(state)):
         if _section("Align", "align the template with the target"):
             _draw_alignment(state)
@@ -168,6 +174,8 @@ def _draw_sources(state: AppState) -> None:
     if template is None or template.actor is None:
         same_line_if_room("Pose it…")
         refuses = no_target(state) or why
+        if view.template_key == SHAPE:
+            refuses = "the skeleton is found when the target is rigged"
         if button(state, "Pose it…", refuses):
             if template is None:
                 start_reading(state, then=_add_template)
@@ -176,6 +184,8 @@ def _draw_sources(state: AppState) -> None:
         explain("add the template next to the target in order to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
     text = "read on first use"
+    if view.template_key == SHAPE:
+        text = "for what is no person and no quadruped: spiders, octopuses, hands, robot arms"
     if template is not None:
         n_joints = template.figure.require_skeleton().n_joints
         mesh = template.figure.mesh
@@ -235,9 +245,8 @@ def _draw_match(state: AppState) -> None:
 def _draw_run(state: AppState) -> None:
     """Draw the settings of the transfer, and the buttons that start it."""
     choices = state.of(Rigging).choices
-    method, template = method_now(state), current_template(state)
-    known = METHODS if template is None else template.methods
-    chosen = choice(state, "Method", method, {name: name for name in known})
+    method = method_now(state)
+    chosen = choice(state, "Method", method, {name: name for name in methods_now(state)})
     explain(METHODS[method])
     if chosen != method:
         choices.method = method = chosen
@@ -292,6 +301,18 @@ def _unused(state: AppState, option: str) -> str:
     if method in _ONLY.get(option, ("robust",)):
         return ""
     return f'the method "{method}" has no such option'
+
+
+def _draw_shape(state: AppState) -> None:
+    """Draw the settings of a skeleton that is found in the target's shape."""
+    choices = state.of(Rigging).choices
+    draw_setting(state, "Up##shape", choices, "up", "up axis of the target")
+    text = "front of the target, from which left and right and the order of limbs follow"
+    draw_setting(state, "Facing##shape", choices, "facing", text)
+    text = "axis along which limbs mirror each other"
+    draw_setting(state, "Symmetry", choices, "symmetry", text)
+    text = "distance of joints in limbs without sharp bends, relative to the usual distance"
+    draw_setting(state, "Joint spacing", choices, "joint_spacing", text)
 
 
 def _draw_alignment(state: AppState) -> None:

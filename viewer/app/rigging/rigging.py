@@ -20,7 +20,9 @@ from viewer.autorig.settings import (
     BINDING,
     JOINTS,
     METHODS,
+    SYMMETRIES,
     JointPlaces,
+    SkeletonSettings,
     TransferMethod,
     TransferSettings,
 )
@@ -59,7 +61,9 @@ GHOSTS: dict[Literal[""] | GhostStyle, str] = {
 """Styles in which the template is drawn, with their labels."""
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
-_USUAL = TransferSettings()
+SHAPE = "shape"
+"""Key of the template that is a skeleton found in the target's shape."""
+_USUAL, _FOUND = TransferSettings(), SkeletonSettings()
 _AXES = {"": "automatic", **{axis: axis for axis in AXES}}
 _SCALES: dict[TemplateScale, str] = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 _posed: Memo[Skin, Mesh] = Memo()
@@ -81,6 +85,8 @@ class Template:
     """Actor of the scene; None if the template was read from files."""
     paths: tuple[Path, ...] = ()
     """The files of the template; empty for an actor."""
+    lines: tuple[Diagnostic, ...] = ()
+    """Messages about a skeleton that was found in the target's shape."""
 
     @property
     def methods(self) -> tuple[TransferMethod, ...]:
@@ -171,6 +177,11 @@ class RigChoices:
     max_influences: int = 0
     """Maximum number of influences per vertex; 0 for all."""
     correctives: bool = setting(_USUAL.correctives)
+    symmetry: str = setting(_FOUND.symmetry, choices=SYMMETRIES)
+    joint_spacing: float = setting(
+        _FOUND.joint_spacing, limits=(0.1, 10.0), unit="%.2f", logarithmic=True
+    )
+    """Symmetry and distance of joints of a skeleton that is found in the target's shape."""
 
 
 @dataclass(slots=True)
@@ -297,7 +308,7 @@ def template_texts(state: AppState) -> dict[str, str]:
     read = state.of(Rigging).template
     if read is not None and read.key == _FILE:
         texts[_FILE] = printable(read.paths[0].name, 60)
-    return texts
+    return texts | {SHAPE: "From shape"}
 
 
 def _actor_key(actor: Actor) -> str:
@@ -322,12 +333,18 @@ def current_template(state: AppState) -> Template | None:
     return read if read is not None and read.key == view.template_key else None
 
 
+def methods_now(state: AppState) -> tuple[TransferMethod, ...]:
+    """Return the methods that can use the chosen template."""
+    if state.of(Rigging).template_key == SHAPE:
+        return BINDING
+    template = current_template(state)
+    return tuple(METHODS) if template is None else template.methods
+
+
 def method_now(state: AppState) -> TransferMethod:
     """Return the chosen method, or the first one that can use the chosen template."""
-    chosen, template = state.of(Rigging).choices.method, current_template(state)
-    if template is None or chosen in template.methods:
-        return chosen
-    return template.methods[0]
+    chosen, known = state.of(Rigging).choices.method, methods_now(state)
+    return chosen if chosen in known else known[0]
 
 
 def compared_methods(method: TransferMethod) -> tuple[TransferMethod, ...]:
@@ -338,6 +355,8 @@ def compared_methods(method: TransferMethod) -> tuple[TransferMethod, ...]:
 def no_placing(state: AppState) -> str:
     """Return the reason why the template cannot be aligned with the target."""
     template = current_template(state)
+    if state.of(Rigging).template_key == SHAPE:
+        return "a skeleton found in the shape is where it should be"
     if template is None or template.figure.is_attached:
         return ""
     return "a skeleton without a mesh is used where it is, or where it fits inside the target"

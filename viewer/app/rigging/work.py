@@ -15,6 +15,7 @@ from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import aligned_template, placing_now, target_place
 from viewer.app.rigging.results import compare, put_results, show_match
 from viewer.app.rigging.rigging import (
+    SHAPE,
     Landmark,
     Placing,
     Result,
@@ -38,9 +39,10 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
+from viewer.autorig.curve_skeleton import find_skeleton
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import TransferMethod, TransferSettings
+from viewer.autorig.settings import SkeletonSettings, TransferMethod, TransferSettings
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
@@ -50,6 +52,7 @@ from viewer.phrases import printable
 from viewer.progress import part_of_work, report
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.geometry.ray_hit import surface_point
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.pose import pose_key
@@ -150,6 +153,8 @@ def _snapshot(state: AppState, aligned: bool) -> Callable[[], Template]:
         aligned_template(state) if aligned else current_template(state),
         state.of(Rigging).template_key,
     )
+    if key == SHAPE:
+        return _found_in_target(state)
     if known is not None:
         copied = replace(known, pose=known.pose.copy())
         return lambda: copied
@@ -161,11 +166,27 @@ def _snapshot(state: AppState, aligned: bool) -> Callable[[], Template]:
     return read
 
 
+def _found_in_target(state: AppState) -> Callable[[], Template]:
+    """Return a function that finds a skeleton in the shape of the target."""
+    target, choices = state.of(Rigging).target, state.of(Rigging).choices
+    assert target is not None  # checked by the callers
+    mesh, alignment = target_mesh(state), _search_settings(state)
+    how = SkeletonSettings(choices.symmetry, choices.joint_spacing)
+
+    def find() -> Template:
+        with part_of_work("Finding joints", (0.0, 0.4)):
+            found = find_skeleton(target.figure, mesh, how, alignment)
+        return Template(SHAPE, found.figure, figure_pose(found.figure), lines=found.lines)
+
+    return find
+
+
 def _keep(state: AppState, template: Template) -> None:
     """Store a template that was read by a job."""
     view = state.of(Rigging)
     is_new = view.template is None or view.template.key != template.key
-    if is_new and template.actor is None and view.template_key == template.key:
+    is_read = template.actor is None and template.key != SHAPE
+    if is_new and is_read and view.template_key == template.key:
         view.template = template
 
 
@@ -284,7 +305,8 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
 
     def act() -> _Finish:
         report(0, 100, "", f"Preparing {printable(name, 40)}")
-        template, found, start = take(), placing, 0.0
+        template, found = take(), placing
+        start = 0.4 if template.key == SHAPE else 0.0
         aligned = template
         if found is None and "robust" in methods:
             start, how = 0.4, searched
@@ -299,6 +321,7 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
             with part_of_work(f"{printable(name, 40)}, {method}", (low, high)):
                 rigged = transfer(aligned.figure, aligned.pose, mesh, settings, called)
             rigged = _with_known_method(rigged, found)
+            rigged = replace(rigged, lines=(*template.lines, *rigged.lines))
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
 
