@@ -46,6 +46,7 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
+from viewer.app.rigging.joint_editing import is_unsaved
 from viewer.app.view.display_panel import draw_view_menu
 from viewer.formats import opened_text
 from viewer.phrases import printable
@@ -113,13 +114,18 @@ def _draw_items(state: AppState, *actions: Action) -> None:
             action.run(state)
 
 
+def _ask_for_export(state: AppState) -> None:
+    """Ask where to export the chosen actor, by default with a new rig if it has one."""
+    ask_for_export(state, ".glb" if is_unsaved(state, state.actor) else ".obj")
+
+
 _BUNDLED = (
     Action("Bundled figure", open_bundled_figure),
     Action("Bundled body", open_bundled_body),
 )
 EXPORTS = (
     Action("Save pose…", ask_for_pose, no_pose),
-    Action("Export…", ask_for_export, no_job_room),
+    Action("Export…", _ask_for_export, no_job_room),
     Action(
         "Export motion…",
         ask_for_motion,

@@ -29,7 +29,8 @@ RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 
 _RIG = (".skel", ".skin", ".obj", ".json")
 _NODES = (".glb", ".gltf", ".vrm")
-_USUAL_INFLUENCES = 4  # per vertex: what game engines and web viewers read of such files
+USUAL_INFLUENCES = 4
+"""Influences per vertex that game engines and web viewers read of such files."""
 
 
 def files_of(output: Path) -> list[Path]:
@@ -96,21 +97,21 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
 def _limited(figure: Figure, requested: int | None) -> tuple[Figure, list[Diagnostic]]:
     """Return the figure with the usual influences per vertex, unless a limit was requested."""
     skin = figure.require_skin()
-    over = int((influence_counts(skin) > _USUAL_INFLUENCES).sum())
+    over = int((influence_counts(skin) > USUAL_INFLUENCES).sum())
     if requested is not None or not over:
         return figure, []
     said = Diagnostic(
         "X003.influences: {n} limited to the {most} strongest influences: {remedy}",
         values={
             "n": counted(over, "vertex"),
-            "most": _USUAL_INFLUENCES,
+            "most": USUAL_INFLUENCES,
             "remedy": Remedy(
                 "Max. influences keeps more, and .npz and .skel all",
                 "--max-influences N keeps more, and .npz and .skel all",
             ),
         },
     )
-    return replace(figure, skin=limit_influences(skin, _USUAL_INFLUENCES)), [said]
+    return replace(figure, skin=limit_influences(skin, USUAL_INFLUENCES)), [said]
 
 
 def _posed_skeleton(figure: Figure, pose: Pose) -> tuple[Figure, Pose]:

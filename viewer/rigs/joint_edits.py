@@ -95,7 +95,7 @@ def prepared(figure: Figure) -> tuple[Figure, list[str]]:
     """Return a figure without what another skeleton makes invalid, and the names of what it had."""
     lost: list[str] = []
     if figure.animations:
-        lost.append(str(counted(len(figure.animations), "animation")))
+        lost.append(counted(len(figure.animations), "animation"))
     if figure.correctives is not None:
         lost.append("pose correctives")
     if figure.hands:

@@ -54,6 +54,7 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
+from viewer.exporters._rigged_files import USUAL_INFLUENCES
 from viewer.phrases import counted, listed, printable
 from viewer.progress import report
 from viewer.rigs.arrays import Floats
@@ -93,8 +94,10 @@ _WEIGHTS: dict[str, str] = {
     "voxel": "voxel: bind again",
     "keep": "keep the weights",
 }
-_Start: TypeAlias = Callable[[], tuple[Figure, Floats | None]]
-"""Computes, in a thread, the figure to edit and its placement in the scene; None to keep that."""
+_Start: TypeAlias = Callable[[], tuple[Figure, Floats | None, list[str]]]
+"""Computes, in a thread, the figure to edit, its placement in the scene (None to keep that), and
+the names of what it lacks of the former one."""
+_NOT_KEPT = "Not kept with other joints: {}"
 _STILL = 2.0  # maximum movement of the pointer during a click, window coordinates
 _LONGEST = 40  # maximum length of a name in messages
 _HOT, _BONE, _DOT = (1.0, 0.92, 0.55, 1.0), (0.45, 0.90, 0.95, 0.9), (1.0, 1.0, 1.0, 0.9)
@@ -265,17 +268,17 @@ def start_editing(state: AppState) -> None:
     take = _STARTS[start](state, actor)
 
     def act() -> Callable[[AppState], None]:
-        figure, place = take()
+        figure, place, lost = take()
         mesh = rest_mesh(figure)
         report(90, 100, "", "Looking for the plane of symmetry")
         _plane_of(figure, mesh)  # so that no click has to wait for it
-        return lambda state: _enter(state, actor, figure, place)
+        return lambda state: _enter(state, actor, figure, place, lost)
 
     begin_work(state, "Finding joints", act)
 
 
 def _own_joints(_state: AppState, actor: Actor) -> _Start:
-    return lambda: (actor.figure, None)
+    return lambda: (actor.figure, None, [])
 
 
 def _fitted_template(state: AppState, actor: Actor) -> _Start:
@@ -285,7 +288,7 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
     how = _weight_settings(state)
     start = aligned_start(state)
 
-    def act() -> tuple[Figure, Floats]:
+    def act() -> tuple[Figure, Floats, list[str]]:
         template, similarity = start()
         pose, settings = template.pose, AlignmentSettings()
         skeleton = shaped_skeleton(template.figure, pose.shape_weights)
@@ -306,7 +309,7 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
         rigged = transfer(joints, plain, mesh, TransferSettings("heat", settings, how), name)
         rest = at_rest(rigged.figure.require_skeleton(), rigged.pose)
         figure = replace(rigged.figure, skeleton=rest, hands=(), pose_layout=None, fields=())
-        return figure, place @ rigged.placement
+        return figure, place @ rigged.placement, []
 
     return act
 
@@ -315,7 +318,7 @@ def _single_root(state: AppState, actor: Actor) -> _Start:
     """Put one joint where the solid is widest, near its plane of symmetry."""
     figure = actor.figure
 
-    def act() -> tuple[Figure, None]:
+    def act() -> tuple[Figure, None, list[str]]:
         report(0, 100, "", "Looking for the middle")
         mesh = rest_mesh(figure)
         plane, solid = _plane_of(figure, mesh), enclosed(mesh)[1]
@@ -335,11 +338,15 @@ def _single_root(state: AppState, actor: Actor) -> _Start:
             np.ones(count),
             inverse,
         )
-        bare = replace(figure, skin=None, skeleton=None, joint_regressor=None, parameters=None)
-        bare = prepared(bare)[0]
-        if mesh is not figure.mesh:
+        bare, lost = prepared(replace(figure, skin=None, skeleton=None))
+        shapes = figure.blend_shapes
+        is_model = figure.joint_regressor is not None or figure.parameters is not None
+        # Shapes of a body model move its joints; others fit the mesh that they were made for.
+        if shapes is not None and (is_model or shapes.space or mesh is not figure.mesh):
+            lost.append(counted(shapes.n_shapes, "blend shape"))
             bare = replace(bare, blend_shapes=None)
-        return replace(bare, mesh=mesh, skeleton=skeleton, skin=skin), None
+        bare = replace(bare, joint_regressor=None, parameters=None)
+        return replace(bare, mesh=mesh, skeleton=skeleton, skin=skin), None, lost
 
     return act
 
@@ -351,7 +358,9 @@ _STARTS: dict[str, Callable[[AppState, Actor], _Start]] = {
 }
 
 
-def _enter(state: AppState, actor: Actor, figure: Figure, place: Floats | None) -> None:
+def _enter(
+    state: AppState, actor: Actor, figure: Figure, place: Floats | None, lost: list[str]
+) -> None:
     """Show a figure in place of an actor's own, at rest, and let the mouse edit its joints."""
     editing = state.of(JointEditing)
     row = next((row for row, one in enumerate(state.scene.actors) if one is actor), -1)
@@ -359,7 +368,9 @@ def _enter(state: AppState, actor: Actor, figure: Figure, place: Floats | None) 
         state.say("The figure to edit no longer exists")
         return
     if actor.clip is not None:
-        state.say_status("The motion was stopped: joints are edited at rest")
+        state.say("The motion was stopped: joints are edited at rest")
+    if lost:
+        state.say(_NOT_KEPT.format(listed(lost, 8)))
     actor.clip, actor.animation, actor.drive, actor.springs = None, -1, None, None
     if figure is not actor.figure:
         editing.made.add(figure)
@@ -407,7 +418,7 @@ def _commit(state: AppState, figure: Figure, text: str, selected: int | None = N
     assert actor is not None  # checked by the callers
     figure, lost = prepared(figure)
     if lost:
-        state.say(f"Not kept with other joints: {listed(lost, 8)}")
+        state.say(_NOT_KEPT.format(listed(lost, 8)))
     _show(actor, figure)
     editing.made.add(figure)
     if editing.choices.weights != "keep":
@@ -666,10 +677,11 @@ def _is_posed(actor: Actor, pose: Pose) -> bool:
 
 
 def _weight_settings(state: AppState) -> WeightSettings:
-    """Return the panel's settings for weights."""
+    """Return the panel's settings for weights; by default, files can hold all influences."""
     choices = state.of(Rigging).choices
     return WeightSettings(
-        smoothing_rounds=choices.smoothing, max_influences=choices.max_influences or None
+        smoothing_rounds=choices.smoothing,
+        max_influences=choices.max_influences or USUAL_INFLUENCES,
     )
 
 
@@ -782,6 +794,7 @@ def draw_section(state: AppState) -> None:
             editing.start = next(iter(known))
         with disabled(state, why):
             editing.start = choice(state, "Start from", editing.start, known)
+            explain(no_edit(actor.figure) if actor.figure.is_attached else "")
             if button(state, "Edit skeleton", no_job_room(state)):
                 start_editing(state)
             explain("place, drag, remove and mirror joints in the view; the weights follow")
