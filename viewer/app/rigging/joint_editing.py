@@ -104,7 +104,7 @@ _HOT, _BONE, _DOT = (1.0, 0.92, 0.55, 1.0), (0.45, 0.90, 0.95, 0.9), (1.0, 1.0, 
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 _AS_WIDE = 0.9  # distance from the surface relative to the largest
 _SAME = 1e-9  # distance of the mesh at rest from the bind pose that is rounding, of its size
-_rest_meshes: Memo[Mesh, Mesh | None] = Memo()
+_rest_meshes: Memo[Figure, Mesh] = Memo()
 _planes: Memo[Mesh, Plane] = Memo()
 
 
@@ -214,17 +214,22 @@ def is_unsaved(state: AppState, actor: Actor) -> bool:
 
 
 def rest_mesh(figure: Figure) -> Mesh:
-    """Return the mesh at rest, which edits do not change: the mesh itself if it was bound so."""
+    """Return the mesh at rest: the mesh itself if it was bound so."""
     mesh = figure.require_mesh()
     if not figure.is_attached:
         return mesh
 
-    def make() -> Mesh | None:
+    def make() -> Mesh:
         posed = posed_mesh(figure, figure_pose(figure))
         apart = np.abs(posed.positions - mesh.positions).max(initial=0.0)
-        return None if apart <= _SAME * box_size(bounding_box(mesh.positions)) else posed
+        return mesh if apart <= _SAME * box_size(bounding_box(mesh.positions)) else posed
 
-    return _rest_meshes.get(mesh, None, make) or mesh
+    return _rest_meshes.get(figure, None, make)
+
+
+def _keep_rest_mesh(figure: Figure, mesh: Mesh) -> None:
+    """Record the mesh at rest of an edited figure, which stays the same object."""
+    _rest_meshes.get(figure, None, lambda: mesh)
 
 
 def _plane_of(figure: Figure, mesh: Mesh) -> Plane:
@@ -417,6 +422,7 @@ def _commit(state: AppState, figure: Figure, text: str, selected: int | None = N
     editing, actor = state.of(JointEditing), edited(state)
     assert actor is not None  # checked by the callers
     figure, lost = prepared(figure)
+    _keep_rest_mesh(figure, rest_mesh(actor.figure))
     if lost:
         state.say(_NOT_KEPT.format(listed(lost, 8)))
     _show(actor, figure)
@@ -737,7 +743,7 @@ def _put_weights(
     if mesh is not figure.mesh and figure.blend_shapes is not None:
         new = replace(new, blend_shapes=None)
         state.say("Not kept: blend shapes, as the mesh at rest differs from the bind pose")
-    # Later edits and undo steps of the same joints share the result.
+    _keep_rest_mesh(new, mesh)
     editing.made.add(new)
     editing.problem = ""
     state.observe()
