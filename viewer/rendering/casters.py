@@ -13,6 +13,7 @@ from viewer.rendering.joint_spheres import (
     Bounds,
     bounds_of,
     box_spheres,
+    moved_spheres,
     skin_spheres,
     stretch_bounds,
 )
@@ -31,6 +32,7 @@ from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped, shaped_skeleton
+from viewer.rigs.skeleton import Skeleton
 
 _BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
 _sizes: Memo[Figure, float] = Memo()
@@ -67,7 +69,11 @@ class Casters:
             how = view, options, fragment, self._prepare
             draw_instance_shapes(self.programs, instances, *how)
         # Over a skin, a skeleton is an overlay and casts no shadow.
-        for actor in self.lineup.skeletons:
+        for group in self.lineup.joint_groups:
+            skeleton = self.buffers.joint_group(group)
+            program = joint_program(self.programs, skeleton, options, "", fragment)
+            draw_joints(program, skeleton, skeleton.placement, view, options)
+        for actor in self.lineup.skeletons_alone:
             if self._blocks(actor) and not shows_mesh(actor.figure, options):
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
                 program = joint_program(self.programs, skeleton, options, "", fragment)
@@ -82,6 +88,8 @@ class Casters:
         found: list[object] = [self.lineup]
         for group, instances in self.meshes.instanced:
             found += [group, instances, instances.n_updates, group.crowd.placement_version]
+        for group in self.lineup.joint_groups:
+            found += [group, group.crowd.version, group.crowd.placement_version]
         for _, mesh in self.meshes.singles:
             found += [mesh, mesh.n_updates]
         for actor in self.lineup.alone:
@@ -106,6 +114,10 @@ class Casters:
             mesh_size(instances.mesh.figure) * instances.largest_scale
             for _, instances in self.meshes.instanced
         ]
+        for group in self.lineup.joint_groups:
+            if group.actors[0].figure.mesh is not None:
+                scale = float(stretch_bounds(group.crowd.models[group.rows]).max())
+                sizes.append(mesh_size(group.actors[0].figure) * scale)
         for actor in self.lineup.alone:
             if actor.figure.mesh is not None:
                 scale = float(stretch_bounds(placement_of(actor, self.options)))
@@ -115,6 +127,11 @@ class Casters:
     def bounds(self) -> list[Bounds]:
         """Return the bounds of all drawn actors, without those whose pose is not finite."""
         found = [instances.bounds() for _, instances in self.meshes.instanced]
+        for group in self.lineup.joint_groups:
+            figure, crowd = group.actors[0].figure, group.crowd
+            skeleton = shaped_skeleton(figure, crowd.shape_weights)
+            spheres = _joint_spheres(figure, skeleton, self.buffers.joint_group(group).worlds)
+            found.append(bounds_of(moved_spheres(crowd.models[group.rows], spheres)))
         for actor in (*self.lineup.alone, *self.lineup.beside):
             found.append(bounds_of(spheres_of(actor, self.options)[None]))
         return [one for one in found if len(one.spheres)]
@@ -132,7 +149,10 @@ def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
     if shows_mesh(actor.figure, options):
         parts.append(_mesh_spheres(actor, options))
     if shows_skeleton(actor, options):
-        parts.append(_joint_spheres(actor))
+        pose = actor.require_pose()
+        skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
+        world = posed_skeleton(skeleton, pose).world[None]
+        parts.append(_joint_spheres(actor.figure, skeleton, world)[0])
     placement = placement_of(actor, options)
     found = np.concatenate(parts or [np.zeros((0, 4))])
     if actor.points is not None:
@@ -152,20 +172,18 @@ def _mesh_spheres(actor: Actor, options: DisplayOptions) -> Floats:
     return skin_spheres(figure, palette)
 
 
-def _joint_spheres(actor: Actor) -> Floats:
-    """Return spheres around an actor's bones and joint boxes, figure space."""
-    pose = actor.require_pose()
-    skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
-    world = posed_skeleton(skeleton, pose).world
-    places = world[:, :3, 3]
-    size, mesh = box_size(bounding_box(places)), actor.figure.mesh
-    if size == 0.0 and mesh is not None:  # used if all joints coincide
-        size = box_size(bounding_box(mesh.positions))
-    thick = np.full(len(places), _BONE * (size or 1.0))
-    bones = np.column_stack([places, thick])
+def _joint_spheres(figure: Figure, skeleton: Skeleton, world: Floats) -> Floats:
+    """Return spheres (A, N, 4) around bones and joint boxes of world matrices (A, J, 4, 4)."""
+    entries = np.moveaxis(world, (-1, -2, -3), (0, 1, 2))  # columns, rows, joints, poses
+    places = entries[3, :3]
+    sizes = np.linalg.norm(np.ptp(places, axis=1), axis=0)
+    # Used if all joints coincide.
+    size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
+    thick = _BONE * np.where(sizes > 0.0, sizes, size or 1.0)
+    bones = np.concatenate([places, np.broadcast_to(thick, (1, *places.shape[1:]))])
     if skeleton.boxes is None:
-        return bones
+        return bones.T
     middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)
-    centers = np.einsum("jik,jk->ji", world[:, :3, :3], middles) + world[:, :3, 3]
-    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch_bounds(world)])
-    return np.concatenate([bones, boxes])
+    centers = np.einsum("kija,jk->ija", entries[:3, :3], middles) + places
+    radii = np.linalg.norm(halves, axis=1)[:, None] * stretch_bounds(world).T
+    return np.concatenate([bones, np.concatenate([centers, radii[None]])], axis=1).T

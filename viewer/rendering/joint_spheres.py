@@ -71,9 +71,9 @@ def stretch_bounds(matrices: Floats) -> Floats:
     """Return upper bounds, (...), of the spectral norms of affine matrices, (..., 4, 4)."""
     # The spectral norm is at most the square root of the largest absolute row sum of M^T M; exactly
     # that for rotations.
-    linear = matrices[..., :3, :3]
-    products = np.abs(np.swapaxes(linear, -1, -2) @ linear)
-    return np.sqrt(products.sum(axis=-1).max(axis=-1))
+    linear = batch_last(matrices[..., :3, :3], 2)
+    products = np.abs(np.einsum("ki...,kj...->ij...", linear, linear))
+    return np.sqrt(products.sum(axis=1).max(axis=0))
 
 
 def _reaches_of(figure: Figure, skin: Skin) -> tuple[Floats, Floats]:

@@ -12,12 +12,16 @@ from viewer.data_classes import dataclass
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
+from viewer.rigs.kinematics import rigid_sizes
 from viewer.rigs.motion.instances import PoseArrays, PoseTable, placements
 from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.scene import Actor
 
 FEWEST = 8
 """Minimum number of actors to draw as instances."""
+
+_MOST_JOINTS = 1000  # of skeletons in crowds; larger ones hide joints that coincide
+_SAME = 1e-6  # largest relative difference of equal scales
 
 Rows = NDArray[np.intp]
 
@@ -85,6 +89,28 @@ class Crowd:
         self._placed = places, shifts, scales
         self.placement_version += 1
 
+    def joint_groups(self) -> list[Group]:
+        """Return the group of actors whose skeletons are drawn together, if it is large enough.
+
+        Their placements have the scale of the first one and no shear, as bones are round.
+        """
+        if (self.placement_version,) != self._key:
+            squares = rigid_sizes(self.models)
+            is_same = (squares > 0.0) & (np.abs(squares - squares[0]) <= _SAME * squares[0])
+            rows = np.flatnonzero(is_same)
+            self._keep_groups([rows] if len(rows) >= FEWEST else [])
+            self._key = (self.placement_version,)
+        return self._groups
+
+    def _keep_groups(self, found: list[Rows]) -> None:
+        """Make groups of rows, unless they are the same as before."""
+        known = [group.rows for group in self._groups]
+        if len(found) != len(known) or not all(map(np.array_equal, found, known)):
+            actors = self.actors
+            self._groups = [
+                Group(self, rows, [actors[row] for row in rows.tolist()]) for rows in found
+            ]
+
     def groups(self, is_culled: bool, most: int) -> list[Group]:
         """Return the groups of at most so many actors, the same objects until they change.
 
@@ -105,12 +131,7 @@ class Crowd:
                 if len(rows) >= FEWEST and most >= FEWEST
                 for start in range(0, len(rows), most)
             ]
-            known = [group.rows for group in self._groups]
-            if len(found) != len(known) or not all(map(np.array_equal, found, known)):
-                actors = self.actors
-                self._groups = [
-                    Group(self, rows, [actors[row] for row in rows.tolist()]) for rows in found
-                ]
+            self._keep_groups(found)
             self._key = key
         return self._groups
 
@@ -123,6 +144,8 @@ class Lineup:
     """All that decides about the other fields; see ``lineup``."""
     crowds: dict[tuple[int, bytes], Crowd] = field(default_factory=dict)
     """Actors whose meshes may be drawn together, by figure and shape."""
+    joint_crowds: dict[tuple[int, bytes], Crowd] = field(default_factory=dict)
+    """Actors of which only the joints are drawn, which may be drawn together."""
     drawn: list[Actor] = field(default_factory=list)
     """All drawn actors."""
     skeletons: list[Actor] = field(default_factory=list)
@@ -133,22 +156,30 @@ class Lineup:
     """Drawn actors whose keypoints are drawn."""
     groups: list[Group] = field(default_factory=list)
     """Groups of the crowds, set by ``divide``."""
+    joint_groups: list[Group] = field(default_factory=list)
+    """Groups of the crowds of joints, set by ``divide``."""
     alone: list[Actor] = field(default_factory=list)
     """Drawn actors that are in no group."""
+    skeletons_alone: list[Actor] = field(default_factory=list)
+    """Drawn actors whose joints are drawn one by one."""
     beside: list[Actor] = field(default_factory=list)
-    """Actors of groups of which more than the mesh is drawn."""
+    """Actors of groups of which something else is drawn one by one."""
 
     def divide(self, groups: list[Group]) -> None:
         """Divide the drawn actors into groups and those that are drawn one by one."""
-        if self.groups == groups and (groups or len(self.alone) == len(self.drawn)):
+        joints = [group for crowd in self.joint_crowds.values() for group in crowd.joint_groups()]
+        is_divided = len(self.alone) == len(self.drawn) or self.groups or self.joint_groups
+        if is_divided and (self.groups, self.joint_groups) == (groups, joints):
             return
-        together = {id(actor) for group in groups for actor in group.actors}
-        more = {id(actor) for actor in self.skeletons}
-        self.groups = groups
+        together = {id(actor) for group in (*groups, *joints) for actor in group.actors}
+        jointed = {id(actor) for group in joints for actor in group.actors}
+        self.groups, self.joint_groups = groups, joints
         self.alone = [actor for actor in self.drawn if id(actor) not in together]
+        self.skeletons_alone = [actor for actor in self.skeletons if id(actor) not in jointed]
+        more = {id(actor) for actor in self.skeletons_alone}
         self.beside = [
             actor
-            for group in groups
+            for group in (*groups, *joints)
             for actor in group.actors
             if id(actor) in more or actor.points is not None
         ]
@@ -179,16 +210,16 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
     key = list(actors), states, shapes, views, shown, FEWEST
     if key != before.key:
         drawn = [actor for actor in actors if actor.is_drawn]
-        crowds = _crowds(drawn, options, before.crowds)
         before = Lineup(
             key,
-            crowds,
+            _crowds(drawn, options, before.crowds),
+            _joint_crowds(drawn, options, before.joint_crowds),
             drawn,
             with_skeleton(drawn, options),
             with_points(drawn, options),
             with_markers(drawn, options),
         )
-    for crowd in before.crowds.values():
+    for crowd in (*before.crowds.values(), *before.joint_crowds.values()):
         crowd.update()
     return before
 
@@ -214,6 +245,29 @@ def _crowds(
         is_plain, has_binds = kinds[id(figure)]
         if is_plain and not (has_binds and pose.shape_weights.any()):
             groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
+    return _large(groups, before)
+
+
+def _joint_crowds(
+    actors: Sequence[Actor], options: DisplayOptions, before: dict[tuple[int, bytes], Crowd]
+) -> dict[tuple[int, bytes], Crowd]:
+    """Return crowds of opaque actors of which only the joints are drawn."""
+    if options.show == "binding":
+        return {}
+    groups: dict[tuple[int, bytes], list[Actor]] = {}
+    for actor in with_skeleton(actors, options):
+        pose, figure = actor.pose, actor.figure
+        if pose is None or shows_mesh(figure, options) or options.opacity * actor.opacity != 1.0:
+            continue
+        if figure.require_skeleton().n_joints <= _MOST_JOINTS:
+            groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
+    return _large(groups, before)
+
+
+def _large(
+    groups: dict[tuple[int, bytes], list[Actor]], before: dict[tuple[int, bytes], Crowd]
+) -> dict[tuple[int, bytes], Crowd]:
+    """Return crowds of the groups with at least ``FEWEST`` actors, known ones if possible."""
     found = {}
     for key, group in groups.items():
         if len(group) >= FEWEST:

@@ -14,7 +14,7 @@ from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.lineup import has_joint_marks, placement_of, shows_mesh
+from viewer.rendering.lineup import Group, has_joint_marks, placement_of, shows_mesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, joint_marks_of
 from viewer.rendering.passes.instance_pass import InstanceBuffers, draw_instance_shapes
@@ -96,8 +96,10 @@ class PickPass:
             whose_numbers = [numbers[id(actor)] for actor in group.actors]
             self._draw_instances(whose_numbers, instances, near, options)
         update_skeletons(self._buffers, lineup, options)
+        for group in lineup.joint_groups:
+            self._draw_joint_group(group, numbers, near, options)
         for which, draw in (
-            (lineup.skeletons, self._draw_skeleton),
+            (lineup.skeletons_alone, self._draw_skeleton),
             (lineup.points, self._draw_points),
             (lineup.markers, self._draw_markers),
         ):
@@ -168,6 +170,19 @@ class PickPass:
         program = joint_program(self._programs, skeleton, options, "", "pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
         draw_joints(program, skeleton, placement_of(actor, options), view, options)
+
+    def _draw_joint_group(
+        self, group: Group, numbers: dict[int, int], view: View, options: DisplayOptions
+    ) -> None:
+        skeleton = self._buffers.joint_group(group)
+        program = joint_program(self._programs, skeleton, options, "", "pick")
+
+        def found(instance: int, _: int, point: Floats) -> Pick:
+            row, joint = divmod(instance, skeleton.n_joints)
+            return Pick(numbers[id(group.actors[row])], joint, -1, -1, point)
+
+        self._number(program, found)
+        draw_joints(program, skeleton, skeleton.placement, view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self._buffers.keypoints_of(actor)

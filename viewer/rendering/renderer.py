@@ -21,7 +21,7 @@ from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
-from viewer.rendering.lineup import Lineup, has_joint_marks, placement_of, shows_mesh
+from viewer.rendering.lineup import Group, Lineup, has_joint_marks, placement_of, shows_mesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.background_pass import BackgroundPass, is_light
 from viewer.rendering.passes.ground_pass import GroundPass
@@ -156,7 +156,11 @@ class Renderer:
         draw_image_planes(self.late, scene, view, options, box)
         index = selected[0]
         chosen = scene.actors[index] if 0 <= index < len(scene.actors) else None
-        skeletons = [(actor, selected[1] if actor is chosen else -1) for actor in lineup.skeletons]
+        skeletons = [
+            (actor, selected[1] if actor is chosen else -1) for actor in lineup.skeletons_alone
+        ]
+        for group in lineup.joint_groups:
+            self._draw_joint_group(group, view, options, chosen, selected[1])
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, 1.0)
@@ -329,6 +333,16 @@ class Renderer:
         context.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         context.depth_func = "<"
+
+    def _draw_joint_group(
+        self, group: Group, view: View, options: DisplayOptions, chosen: Actor | None, joint: int
+    ) -> None:
+        skeleton = self.buffers.joint_group(group)
+        numbers = [number for number, actor in enumerate(group.actors) if actor is chosen]
+        if joint >= 0 and numbers:
+            joint += numbers[0] * skeleton.n_joints
+        selected = joint if numbers else -1
+        self.joint_pass.draw(skeleton, skeleton.placement, view, options, selected)
 
     def _draw_skeleton(
         self,

@@ -44,7 +44,6 @@ def prepare_meshes(buffers: ActorBuffers, lineup: Lineup, options: DisplayOption
     """Upload the buffers of a lineup's meshes, without skinning posed buffers."""
     meshes = Meshes()
     size = 0
-    lineup.divide(buffers.groups(lineup, options))
     of_figure: dict[int, list[Group]] = {}
     for group in lineup.groups:
         of_figure.setdefault(id(group.actors[0].figure), []).append(group)
@@ -75,7 +74,9 @@ def update_meshes(buffers: ActorBuffers, lineup: Lineup, options: DisplayOptions
 def update_skeletons(buffers: ActorBuffers, lineup: Lineup, options: DisplayOptions) -> None:
     """Upload the joint matrices of all drawn skeletons that moved, computed per figure."""
     groups: dict[tuple[int, bytes], list[tuple[Actor, Pose]]] = {}
-    for actor in lineup.skeletons:
+    for joint_group in lineup.joint_groups:
+        buffers.joint_group(joint_group).update_group(joint_group)
+    for actor in lineup.skeletons_alone:
         pose = actor.pose
         if pose is not None and not buffers.skeleton(actor).is_current(pose, options):
             key = id(actor.figure), pose.shape_weights.tobytes()

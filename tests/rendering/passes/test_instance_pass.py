@@ -35,6 +35,7 @@ from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.pose import placement_matrix
 from viewer.rigs.scene import Actor, Scene, scene_box
 from viewer.rigs.skinning import METHODS, Skinning
 
@@ -314,6 +315,72 @@ def test_instanced_skeletons_match_single_ones(offscreen):
             wanted = world_matrices(actor.figure.skeleton, actor.pose)[:, :3]
             assert np.allclose(rows[..., :3], wanted[..., :3], atol=1e-6)
             assert np.allclose(rows[..., 3] + boxes.center, wanted[..., 3], atol=1e-6)
+
+
+def crowd_of_skeletons() -> Scene:
+    """Return arms in rows, all at half their size, some coloured, one of them sheared."""
+    scene = rows_of_arms(FEWEST + 2)
+    for number, actor in enumerate(scene.actors):
+        angle = 0.2 * number
+        actor.placement[[0, 0, 2, 2], [0, 2, 0, 2]] = [
+            *(np.cos(angle), np.sin(angle)),
+            *(-np.sin(angle), np.cos(angle)),
+        ]
+        actor.pose.figure_scale = 0.5
+        actor.pose.figure_translation[0] = 0.1 * number
+    scene.actors[4].placement[0, 1] = 0.5
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("bones", "quality"),
+    [("octahedra", "normal"), ("sticks", "draft"), ("axes", "draft"), ("boxes", "draft")],
+)
+def test_skeletons_of_a_crowd_look_like_single_ones(offscreen, monkeypatch, work, bones, quality):
+    scene, size = crowd_of_skeletons(), (200, 150)
+    options = DisplayOptions(show="skeleton", bones=bones, quality=quality)
+    camera, box = default_camera(scene, size), scene_box(scene)
+    how, selected = (scene, camera, options), (5, 1)
+
+    def drawn() -> np.ndarray:
+        with offscreen.context:
+            target = offscreen.target(size, 1)
+            offscreen.renderer.draw(*how, target, box, selected)
+            return target.read().astype(int)
+
+    together = drawn()
+    drawn()  # the second image of a size stores its background
+    work.clear()
+    assert (drawn() == together).all() and work["write"] == 0
+    n_draws = work["render"]
+    scene.actors[3].pose.dofs[3] += 0.5
+    scene.actors[6].color = 0.1, 0.6, 0.1
+    moved = drawn()
+    assert (moved != together).any()
+    monkeypatch.setattr(lineup, "FEWEST", 100)
+    drawn()
+    work.clear()
+    alone = drawn()
+    assert (np.abs(moved - alone).max(axis=-1) > 2).mean() < 0.001
+    # Ten skeletons need as many draws as two: the sheared one is drawn alone.
+    parts = {"octahedra": 2, "sticks": 2, "axes": 3, "boxes": 1}[bones]
+    assert work["render"] - n_draws == parts * (FEWEST + 2 - 2)
+
+
+def test_picked_joints_of_a_crowd_are_those_of_their_actors(offscreen):
+    scene, size = crowd_of_skeletons(), (200, 150)
+    options = DisplayOptions(show="skeleton", bones="boxes")
+    camera, box = default_camera(scene, size), scene_box(scene)
+    view = view_of(camera, size, box)
+    for number in (0, 4, 7):
+        actor = scene.actors[number]
+        place = actor.placement @ placement_matrix(actor.pose)
+        point = place @ world_matrices(actor.figure.skeleton, actor.pose)[1, :, 3]
+        clip = view.projection @ view.matrix @ point
+        x, y = (0.5 + 0.5 * clip[:2] / clip[3] * (1.0, -1.0)) * size
+        with offscreen.context:
+            found = offscreen.renderer.pick(scene, camera, options, size, x, y, box)
+        assert (found.actor, found.joint) == (number, 1)
 
 
 def test_point_figures_are_drawn_with_all_options(offscreen):

@@ -63,6 +63,7 @@ class ActorBuffers:
         self._instanced: Kept[Figure, _InstancedShapes] = Kept()
         self.posed: Kept[Actor, PosedMesh] = Kept()
         self.skeletons: Kept[Actor, SkeletonBuffers] = Kept()
+        self._joint_groups: Kept[Group, SkeletonBuffers] = Kept()
         self.keypoints: Kept[Actor, KeypointBuffers] = Kept()
         self.points: Kept[Actor, PointBuffers] = Kept()
         self.motion_paths: Kept[Actor, MotionPathBuffers] = Kept()
@@ -86,6 +87,15 @@ class ActorBuffers:
         figure = actor.figure
         make = lambda: SkeletonBuffers(self.context, figure, self._cube)  # noqa: E731
         return self.skeletons.get(actor, make)
+
+    def joint_group(self, group: Group) -> SkeletonBuffers:
+        """Return the joints of a group, which are drawn together; ``line_up`` frees them."""
+        figure, kept = group.actors[0].figure, self._joint_groups
+        colors = [group.crowd.colors[row] for row in group.rows.tolist()]
+        make = lambda: SkeletonBuffers(self.context, figure, self._cube, colors)  # noqa: E731
+        if kept.get(group, make).colors != colors:
+            kept.drop(group)
+        return kept.get(group, make)
 
     def keypoints_of(self, actor: Actor) -> KeypointBuffers:
         """Return the markers of an actor's keypoints; its figure must have keypoints."""
@@ -119,8 +129,10 @@ class ActorBuffers:
         return kept
 
     def line_up(self, actors: Sequence[Actor], options: DisplayOptions) -> Lineup:
-        """Return the drawn actors of a scene, with crowds that are up to date."""
+        """Return the drawn actors of a scene, with crowds and groups that are up to date."""
         self._lineup = lineup(actors, options, self._lineup)
+        self._lineup.divide(self.groups(self._lineup, options))
+        self._joint_groups.keep_only(self._lineup.joint_groups)
         return self._lineup
 
     def groups(self, drawn: Lineup, options: DisplayOptions) -> list[Group]:
@@ -159,6 +171,7 @@ class ActorBuffers:
         if (actors, figures, self._n_kept()) == self._state:
             return  # nothing was made since, and a thousand actors need not be looked up
         self._shared.release()
+        self._joint_groups.keep_only([])
         self.posed.keep_only(actors, self._forget)
         for kept in (self.skeletons, self.keypoints, self.points, self.motion_paths):
             kept.keep_only(actors)

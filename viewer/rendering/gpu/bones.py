@@ -18,7 +18,7 @@ from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rendering.options import BoneStyle
+from viewer.rendering.options import BoneStyle, Color
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.kinematics import world_matrices
@@ -53,20 +53,27 @@ _TIP_WIDTH = 2.4  # width of the tip, in widths of the shaft
 
 
 class BoneBuffers:
-    """A skeleton as octahedra, sticks or axes.
+    """Skeletons of actors of one figure as octahedra, sticks or axes.
 
     The rest pose determines directions and sizes of ends without a child. ``size``: size of the
-    figure if all joints coincide, figure units.
+    figure if all joints coincide, figure units. ``colors``: of the actors, linear; None for one
+    colour per joint. The joints of an actor follow those of the actor before it.
     """
 
     def __init__(
-        self, context: moderngl.Context, skeleton: Skeleton, style: BoneStyle, size: float
+        self,
+        context: moderngl.Context,
+        skeleton: Skeleton,
+        style: BoneStyle,
+        size: float,
+        colors: Sequence[Color | None] = (None,),
     ) -> None:
         links = _bone_links(skeleton, size)
         self._owner = Owner()
         self._parts: list[_Part] = []
         with self._owner.guard():
             for shape, rows in _STYLES[style](links, skeleton.n_joints):
+                rows = _repeated(rows, skeleton.n_joints, colors)
                 self._parts.append(self._owner.keep(_Part(context, shape, rows)))
 
     def draw(self, program: moderngl.Program) -> None:
@@ -117,6 +124,20 @@ class _Rows:
     ends: Floats
     widths: Floats
     colors: Floats
+
+
+def _repeated(rows: _Rows, n_joints: int, colors: Sequence[Color | None]) -> _Rows:
+    """Return the instances of one skeleton for each actor, with its colour if it has one."""
+    count = len(colors)
+    links = np.tile(rows.links, (count, 1, 1))
+    first = n_joints * np.arange(count, dtype=np.int32)[:, None]
+    links[..., 0] += first
+    links[..., 1] += np.where(links[..., 1] >= 0, first, 0)
+    painted = np.stack(
+        [rows.colors if color is None else 0 * rows.colors + color for color in colors]
+    )
+    ends, widths = (np.tile(part, (count, 1)) for part in (rows.ends, rows.widths))
+    return _Rows(links.reshape(-1, 3), ends, widths, painted.reshape(-1, 3))
 
 
 def _octahedra(links: _BoneLinks, n_joints: int) -> list[tuple[Floats, _Rows]]:

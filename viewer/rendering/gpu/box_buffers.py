@@ -20,10 +20,16 @@ class BoxBuffers:
 
     ``world``: the matrices, relative to ``center``: (3,), figure space; part of the model matrix.
     ``cube``: corners and normals of a cube from 0 to 1, shared by all boxes. ``boxes``: (N, 2, 3),
-    lower and upper corner of each box.
+    lower and upper corner of each box. ``colors``: (N, 3) linear; those of joints if omitted.
     """
 
-    def __init__(self, context: moderngl.Context, cube: moderngl.Buffer, boxes: Floats) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        cube: moderngl.Buffer,
+        boxes: Floats,
+        colors: Floats | None = None,
+    ) -> None:
         self.count, self._boxes = len(boxes), boxes
         self.center: Floats = np.zeros(3)
         self._cube = cube
@@ -32,7 +38,8 @@ class BoxBuffers:
             keep = self._owner.keep
             self._low = keep(buffer(context, boxes[:, 0], "f4"))
             self._high = keep(buffer(context, boxes[:, 1], "f4"))
-            self._colors = keep(buffer(context, joint_colors(self.count), "f4"))
+            colors = joint_colors(self.count) if colors is None else colors
+            self._colors = keep(buffer(context, colors, "f4"))
             self.world = keep(matrix_texture(context, self.count))
         self._arrays = self._owner.keep(VertexArrays(context))
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
+from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.draw_state import draw_nearest
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.lineup import Group
 from viewer.rendering.options import BoneStyle, Color, DisplayOptions, bone_style, skeleton_opacity
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rigs.arrays import Floats
@@ -18,7 +21,8 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import posed_skeleton, world_matrices
 from viewer.rigs.memo import NumberKey
 from viewer.rigs.mesh import bounding_box, box_size
-from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.motion.instances import worlds
+from viewer.rigs.pose import Pose, batch_last, rest_pose
 from viewer.rigs.shape import shaped_skeleton
 from viewer.rigs.skeleton import Skeleton, shown_joints
 from viewer.rigs.skinning import deform
@@ -35,17 +39,39 @@ _CUBE_VERTICES = 36
 
 
 class SkeletonBuffers:
-    """Shapes of one figure's joints, moved by one actor's pose."""
+    """Shapes of a figure's joints, moved by the pose of one actor or by those of a group.
 
-    def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
+    ``colors``: of a group's actors; see ``BoneBuffers``. ``worlds``: (A, J, 4, 4) of a group,
+    figure space. ``placement``: of the shapes of a group in the scene.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        figure: Figure,
+        cube: moderngl.Buffer,
+        colors: Sequence[Color | None] = (None,),
+    ) -> None:
         from viewer.rendering.gpu.box_buffers import BoxBuffers
 
         skeleton = figure.require_skeleton()
-        self.context, self.figure = context, figure
+        self.context, self.figure, self.colors = context, figure, colors
         self._size = _size(figure)
-        self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton, self._size))
+        boxes = np.tile(_joint_boxes(skeleton, self._size), (len(colors), 1, 1))
+        painted = np.tile(joint_colors(skeleton.n_joints), (len(colors), 1, 1))
+        for row, color in enumerate(colors):
+            painted[row] = painted[row] if color is None else color
+        self.boxes = BoxBuffers(context, cube, boxes, painted.reshape(-1, 3))
         self._bones: dict[str, BoneBuffers] = {}
         self._key: tuple[NumberKey, bool] | None = None
+        self._versions: tuple[int, int] | None = None
+        self.worlds: Floats = np.zeros((0, 0, 4, 4))
+        self.placement: Floats = np.eye(4)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints of one actor."""
+        return self.figure.require_skeleton().n_joints
 
     def style(self, options: DisplayOptions) -> BoneStyle:
         """Return the style of the drawn skeleton; see ``bone_style``."""
@@ -61,7 +87,8 @@ class SkeletonBuffers:
             from viewer.rendering.gpu.bones import BoneBuffers
 
             skeleton = self.figure.require_skeleton()
-            self._bones[style] = BoneBuffers(self.context, skeleton, style, self._size)
+            how = style, self._size, self.colors
+            self._bones[style] = BoneBuffers(self.context, skeleton, *how)
         return self._bones[style]
 
     def is_current(self, pose: Pose, options: DisplayOptions) -> bool:
@@ -77,6 +104,24 @@ class SkeletonBuffers:
         # Bones reach from one joint to another, so they need the matrices of all joints.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
         self._key = pose.skinning_key, are_boxes
+
+    def update_group(self, group: Group) -> None:
+        """Upload the matrices of a group's joints if a pose or a placement changed."""
+        crowd = group.crowd
+        versions = crowd.version, crowd.placement_version
+        if versions == self._versions:
+            return
+        if self._versions is None or self._versions[0] != crowd.version:
+            skeleton = shaped_skeleton(self.figure, crowd.shape_weights)
+            self.worlds = worlds(skeleton, crowd.arrays.rows(group.rows))
+        models = crowd.models[group.rows]
+        # Widths of bones are in figure units, so the common scale stays in the placement.
+        scale = float(np.linalg.norm(models[0, :3, 0]))
+        self.placement = np.diag([scale, scale, scale, 1.0])
+        entries = batch_last(np.linalg.inv(self.placement) @ models, 2)
+        placed = np.einsum("ika,ajkl->ajil", entries, self.worlds)
+        self.boxes.move(placed.reshape(-1, 4, 4), hides=False)
+        self._versions = versions
 
     def release(self) -> None:
         """Free every buffer."""
