@@ -26,6 +26,7 @@ OTHER_FOLDERS = {"bench", "bench/references", "data", "golden"}
 # The parts of the package that each part may import, in addition to itself and to the parts that
 # every part may import.
 EVERYWHERE = {
+    "arguments",
     "data_classes",
     "diagnostics",
     "errors",
@@ -65,6 +66,7 @@ PARTS = {
     "version": set(),
 }
 LEAVES = {
+    "arguments": {"errors"},
     "data_classes": set(),
     "phrases": set(),
     "diagnostics": {"data_classes", "phrases"},

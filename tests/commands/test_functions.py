@@ -230,3 +230,41 @@ def test_file_of_tensors_is_the_same_body_as_on_the_command_line(has_model, tmp_
     (actor,) = viewer.load(path, model=model)
     assert actor.figure.skeleton.n_joints == told["skeleton"]["joints"] == (55 if has_model else 24)
     assert actor.figure.mesh.n_vertices == told["mesh"]["vertices"]
+
+
+ACT = viewer.animate(leg(), np.zeros((4, 2, 3)), fps=10)
+TINY = (32, 24)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: viewer.export([ACT], "x.glb"), "^export: expected a scene or an actor, found"),
+        (lambda: viewer.export(ACT, 3), "^path: expected a text or Path, found int"),
+        (lambda: viewer.export(ACT, "x.glb", frames="1:2"), r"^frames: expected a range such as"),
+        (lambda: viewer.export(ACT, "x.qqq"), 'no exporter'),
+        (lambda: viewer.video(ACT, "x.gif", frames=[1]), "^frames: expected a range such as"),
+        (lambda: viewer.render(ACT, 32), r"^size: expected two integers, such as \(640, 360\)"),
+        (lambda: viewer.render(ACT, (32.0, 24)), r"^size: expected two integers"),
+        (lambda: viewer.render(ACT, TINY, time="1"), "^time: expected a number, found str"),
+        (lambda: viewer.render(ACT, TINY, distance="3"), "^distance: expected a number or None"),
+        (lambda: viewer.render(ACT, TINY, camera="front"), "^camera: expected Camera or None"),
+        (lambda: viewer.render(ACT, TINY, options={}), "^options: expected DisplayOptions or None"),
+        (lambda: viewer.render(ACT, TINY, background=3), "^background: expected a text or None"),
+        (lambda: viewer.animate(ACT, np.zeros((1, 2, 3))), "^figure: expected Figure, found Actor"),
+        (lambda: viewer.animate(leg(), np.zeros((1, 2, 3)), fps="x"), "^fps: expected a number"),
+        (lambda: viewer.figure(SQUARE, [[0, 1, 2]], up="x"), "^up: expected one of .*, found 'x'"),
+        (lambda: leg(name="a", up="-y"), "^up: expected one of "),
+        (lambda: viewer.load("fox", motion="x"), "^motion: expected MotionSettings or None"),
+        (lambda: viewer.deform(ACT), "^figure: expected Figure, found Actor"),
+        (lambda: viewer.motion(viewer.Scene([ACT])), "^motion: expected Actor, found Scene"),
+        (lambda: viewer.pose_errors(1, ACT), "^found: expected Actor, found int"),
+        (lambda: viewer.Actor("fox"), "^figure: expected Figure, found str"),
+        (lambda: ACT[0], "^joint: expected a text, found int"),
+        (lambda: ACT.at(None), "^time: expected a number, found NoneType"),
+        (lambda: ACT.__setitem__("joint_1", "x"), "^joint_1: expected a rotation vector"),
+    ],
+)  # fmt: skip
+def test_other_types_are_refused(call, message):
+    with pytest.raises(ViewerError, match=message):
+        call()

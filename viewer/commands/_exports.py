@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING
 
+from viewer.arguments import check_type
 from viewer.commands._scene import SceneOptions
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
@@ -77,6 +79,10 @@ def export(
     from viewer.commands.convert import check_outputs, selected
     from viewer.exporters import ExportOptions, export, output_files
 
+    check_type("path", path, str, Path)
+    check_type("frames", frames, range, NoneType)
+    check_type("fps", fps, float, NoneType)
+    check_type("skinning", skinning, Skinning, NoneType)
     chosen = replace(options) if options is not None else ExportOptions()
     chosen.skinning = chosen.skinning if skinning is None else skinning
     chosen.meta, chosen.optimizes = meta or chosen.meta, optimizes or chosen.optimizes

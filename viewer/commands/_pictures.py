@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 
+import numpy as np
+
+from viewer.arguments import check_type
 from viewer.commands._frames import numbering_of
 from viewer.commands._keywords import without_dashes
 from viewer.commands._scalar import scalar_notes
 from viewer.commands._scene import SceneOptions
 from viewer.commands._sequence import Request, parse_turntable
 from viewer.commands._view import ViewOptions, camera_of
-from viewer.errors import ViewerError
+from viewer.errors import RigError, ViewerError
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
@@ -92,6 +97,8 @@ def render(
     (48, 64, 4)
     """
     scene, shown = scene_of(scene, "render"), _display(options, background, quality, scalar)
+    _check_types(size, distance, azimuth, inclination, look_at)
+    check_type("camera", camera, Camera, NoneType)
     if time is not None:
         scene = scene_at(scene, time)
     view = ViewOptions(
@@ -168,6 +175,9 @@ def video(
     from viewer.commands.render import Drawing, complete, draw_sequence
 
     scene, shown = scene_of(scene, "video"), _display(options, background, quality, scalar)
+    _check_types(size, distance, azimuth, inclination, look_at)
+    check_type("path", path, str, Path)
+    check_type("frames", frames, range, NoneType)
     view = ViewOptions(
         look_at=look_at,
         follow=follow,
@@ -203,8 +213,26 @@ def video(
         )
 
 
+def _check_types(
+    size: tuple[int, int],
+    distance: float | None,
+    azimuth: float | None,
+    inclination: float | None,
+    look_at: str | None,
+) -> None:
+    """Raise RigError for settings of another type than pictures need."""
+    is_size = isinstance(size, Sequence | np.ndarray) and not isinstance(size, str)
+    if not is_size or len(size) != 2 or not all(isinstance(n, int | np.integer) for n in size):
+        raise RigError(f"size: expected two integers, such as (640, 360), found {size!r}")
+    angles = {"azimuth": azimuth, "inclination": inclination}
+    for name, number in ({"distance": distance} | angles).items():
+        check_type(name, number, float, NoneType)
+    check_type("look_at", look_at, str, NoneType)
+
+
 def scene_at(scene: Scene, time: float) -> Scene:
     """Return a copy of a scene, posed at a time that its motions reach."""
+    check_type("time", time, float)
     if not math.isfinite(time):
         raise ViewerError(f"time: expected seconds, found {time}")
     scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
@@ -222,6 +250,9 @@ def _display(
     scalar: str | None,
 ) -> DisplayOptions:
     """Return a copy of display options with the given values, all of which are checked."""
+    check_type("options", options, DisplayOptions, NoneType)
+    for name, text in (("background", background), ("quality", quality), ("scalar", scalar)):
+        check_type(name, text, str, NoneType)
     shown = replace(DisplayOptions(quality="normal") if options is None else options)
     if background is not None:
         shown.background = background

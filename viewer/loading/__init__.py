@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 
+from viewer.arguments import check_type
 from viewer.errors import ViewerError
 from viewer.formats import MAX_SIZE
 from viewer.loading.assembly import assemble, begin
@@ -85,6 +87,8 @@ def load(
                 f"load: expected paths or names, found {type(path).__name__}; several are given "
                 "as load(*paths)"
             )
+    check_type("model", model, str, Path, NoneType)
+    check_type("motion", motion, MotionSettings, NoneType)
     if gender and gender not in GENDERS:
         raise ViewerError(f'gender: expected {" or ".join(GENDERS)}, found "{printable(gender)}"')
     settings = motion or MotionSettings()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkabl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from viewer.arguments import check_type
 from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.formats._references import read_picture
@@ -25,6 +26,7 @@ from viewer.rigs.motion.timing import Timing
 from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skin import Skin, skin_from_entries
+from viewer.rigs.units import METRES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -114,6 +116,10 @@ def figure(
     >>> viewer.figure([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], joints=[[0, 0, 0]]).name
     'figure'
     """
+    for what, given, known in (("up", up, ("y", "z")), ("unit", unit, ("", *METRES))):
+        if given not in known:
+            allowed = ", ".join(f'"{each}"' for each in known)
+            raise RigError(f"{what}: expected one of {allowed}, found {given!r}")
     positions = _numbers("vertices", vertices, (None, 3))
     triangles = _triangles(faces, len(positions))
     coordinates = None if uvs is None else _numbers("uvs", uvs, (len(positions), 2))
@@ -186,6 +192,8 @@ def animate(
     """
     from viewer.rigs.scene import pose_actors
 
+    check_type("figure", figure, Figure)
+    check_type("fps", fps, float)
     skeleton = figure.require_skeleton()
     quaternions = _quaternions(rotations, skeleton.n_joints, representation)
     count = len(quaternions)

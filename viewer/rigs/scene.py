@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
@@ -154,6 +155,7 @@ class Actor:
         return self.clip if self.clip is not None and self.clip.kind == "transforms" else None
 
     def __post_init__(self) -> None:
+        check_type("figure", self.figure, Figure)
         if self.pose is None and self.figure.skeleton is not None:
             self.pose = figure_pose(self.figure)
 
@@ -191,6 +193,7 @@ class Actor:
         from viewer.rigs.geometry.rotation import matrix_to_rotation_vector
         from viewer.rigs.pose import joint_rotations
 
+        check_type("joint", joint, str)
         skeleton = self.figure.require_skeleton()
         turned = joint_rotations(skeleton, self.require_pose())
         return matrix_to_rotation_vector(turned[find_joint(skeleton, joint)])
@@ -200,8 +203,12 @@ class Actor:
         from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
         from viewer.rigs.posing.pose_vector import set_joint_rotations
 
+        check_type("joint", joint, str)
         skeleton = self.figure.require_skeleton()
-        vector = np.asarray(rotation, dtype=np.float64)
+        try:
+            vector = np.asarray(rotation, dtype=np.float64)
+        except (TypeError, ValueError):
+            vector = np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all():
             raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation}")
         joints = np.array([find_joint(skeleton, joint)], dtype=np.int32)
@@ -312,6 +319,7 @@ class Actor:
 
     def _reached(self, time: float) -> float:
         """Return a time; RigError if a captured motion lacks it, as only keys hold or run on."""
+        check_type("time", time, float)
         if not math.isfinite(time):
             raise RigError(f"time: expected seconds, found {time}")
         clip = self.captured

@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats
@@ -74,6 +75,8 @@ def pose_errors(
     RigError
         If joints or frames differ in number, units are unknown, or no frame has both.
     """
+    check_type("found", found, Actor)
+    check_type("reference", reference, Actor)
     ours, theirs = found.joints(), reference.joints()
     for axis, what in ((1, "joints"), (0, "frames")):
         if ours.shape[axis] != theirs.shape[axis]:

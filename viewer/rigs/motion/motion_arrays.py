@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
@@ -100,6 +101,7 @@ def motion(actor: Actor, interpolate: bool = False) -> MotionArrays:
         ...
     viewer.errors.RigError: fox has no motion of joints
     """
+    check_type("motion", actor, Actor)
     sampled = sample_animation(actor, interpolate=interpolate)
     skeleton, frames = sampled.figure.require_skeleton(), sampled.frames
     numbers = sampled.first_frame + np.arange(frames.n_frames)

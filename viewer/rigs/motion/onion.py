@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rigs.scene import Actor, Scene, pose_actors
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_of
 
 FAINTEST = 0.22
 """Opacity of the earliest pose."""
 
 
 def onion(
-    scene: Scene,
+    scene: Scene | Actor,
     times: int | Iterable[float],
     *,
     interpolate: bool = False,
@@ -27,8 +27,8 @@ def onion(
 
     Parameters
     ----------
-    scene : Scene
-        Scene, which is not modified; actors without a motion are shown once.
+    scene : Scene or Actor
+        What moves, which is not modified; actors without a motion are shown once.
     times : int or iterable of float
         Number of poses, evenly spaced over the motions, or their times on the scene's clock,
         seconds, in any order.
@@ -53,6 +53,7 @@ def onion(
         ...
     viewer.errors.RigError: nothing moves: no actor has a motion
     """
+    scene = scene_of(scene, "onion")
     moving = [actor for actor in scene.actors if actor.clip is not None]
     if not moving:
         raise RigError("nothing moves: no actor has a motion")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints
@@ -140,6 +141,7 @@ def deform(
     >>> positions.shape == figure.mesh.positions.shape
     True
     """
+    check_type("figure", figure, Figure)
     how = Skinning(method) if isinstance(method, str) else method
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
