@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.draw_state import draw_nearest
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
@@ -52,6 +51,7 @@ class SkeletonBuffers:
         cube: moderngl.Buffer,
         colors: Sequence[Color | None] = (None,),
     ) -> None:
+        from viewer.rendering.colors import joint_colors
         from viewer.rendering.gpu.box_buffers import BoxBuffers
 
         skeleton = figure.require_skeleton()
