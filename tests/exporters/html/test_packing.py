@@ -1,11 +1,18 @@
 """Numbers of a page: rounding, differences, and fields of displacements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from rendering.drawn_figures import random_figure, random_pose
 
+from viewer.exporters.html.motion import tracks_of
 from viewer.exporters.html.offsets import principal_fields
 from viewer.exporters.html.packing import Packer, unpacked
+from viewer.rigs.blendshapes import Correctives
+from viewer.rigs.shape import pose_weights
+from viewer.rigs.skinning import Skinning
 
 
 def read_back(packer):
@@ -95,3 +102,25 @@ def test_a_still_pose_needs_no_field():
     found = principal_fields(weights, lambda row: np.einsum("s,sva->va", row, shapes), 1e-9)
     assert len(found.fields) == 0
     assert_allclose(found.mean, np.einsum("s,sva->va", weights[0], shapes), atol=1e-12)
+
+
+def test_many_needed_correctives_are_those_of_the_model():
+    """Each corrective moves one vertex, so its own field is nearly all zeros."""
+    figure = moved_vertex_by_vertex()
+    poses = [random_pose(figure.skeleton, np.random.default_rng(seed)) for seed in range(40)]
+    surface = tracks_of(figure, poses, Skinning()).surface
+    found = surface.correctives
+    assert_array_equal(np.count_nonzero(found.fields.any(axis=2), axis=1), 1)
+    skeleton = figure.skeleton
+    weights = np.stack([pose_weights(figure.correctives, skeleton, pose) for pose in poses])
+    wanted = np.einsum("fp,pva->fva", weights, figure.correctives.offsets)
+    again = found.mean + np.einsum("fk,kva->fva", found.weights, found.fields)
+    assert_allclose(again, wanted, atol=1e-12)
+
+
+def moved_vertex_by_vertex():
+    random = np.random.default_rng(11)
+    figure = random_figure(random, 4, n_vertices=60)
+    offsets = np.zeros((27, figure.mesh.n_vertices, 3))
+    offsets[np.arange(27), np.arange(27)] = random.normal(size=(27, 3))
+    return replace(figure, correctives=Correctives(offsets))

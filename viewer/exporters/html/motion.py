@@ -38,6 +38,7 @@ float32, stay below 1e-5 of the size."""
 _EQUAL = 1e-9  # relative difference of lengths that counts as none
 _NORMAL_TOLERANCE = 2e-3  # of unit normals: 0.1 degrees
 _COARSEST_WEIGHT = 0.01
+_MOST_NUMBERS = 30_000_000  # of a model's correctives that are compared with principal fields
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
 _RIGID = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])  # stretch of a joint that does not scale
 _EVEN = 1e-4  # relative difference of scales, beyond the rounding of single-precision files
@@ -188,7 +189,19 @@ def _correctives(
         pose_weights(correctives, shaped_skeleton(figure, pose.shape_weights), pose)
         for pose in present
     ]
-    return principal_fields(np.stack(found), correctives.displacement, tolerance, is_centered)
+    weights = np.stack(found)
+    fewest = principal_fields(weights, correctives.displacement, tolerance, is_centered)
+    # Each corrective displaces few vertices, the principal fields all of them: where many fields
+    # are needed, those of the model take less space, as zeros do not.
+    kept = np.flatnonzero(np.abs(weights).max(axis=0, initial=0.0) > 0.0)
+    if not len(fewest.fields) or len(kept) * fewest.mean.size > _MOST_NUMBERS:
+        return fewest
+    scale = np.abs(weights[:, kept]).max(axis=0)
+    unit = np.eye(weights.shape[1])[kept]
+    own = np.stack([correctives.displacement(row) for row in unit * scale[:, None]])
+    if np.count_nonzero(np.abs(own) > tolerance / len(own)) > fewest.fields.size:
+        return fewest
+    return Fields(np.zeros_like(fewest.mean), weights[:, kept] / scale, own)
 
 
 def _looks(figure: Figure, weights: Sequence[Floats]) -> dict[int, list[Material]]:
