@@ -39,7 +39,7 @@ def test_every_option_is_documented(command):
         (
             "convert",
             "files, output, writing motions, writing VRM characters, writing HTML pages, frames, "
-            "captures and BVH, clean-up, shape and pose, skinning",
+            "captures and BVH, clean-up, faults, shape and pose, skinning",
         ),
         (
             "view",
