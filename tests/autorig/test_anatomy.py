@@ -90,6 +90,22 @@ def test_ears_as_long_as_arms_are_another_pair():
     assert len(arms) == 2 and plans[0] in arms
 
 
+def test_staff_in_one_hand_is_not_part_of_the_arm():
+    positions, triangles = person()
+    staff, more = mesh(ball_chain((0.7, 0.6, 0.03, 0.03), (0.7, 1.75, 0.03, 0.03)))
+    anatomy = anatomy_of(
+        np.concatenate([positions, staff]),
+        np.concatenate([triangles, len(positions) + more]),
+        UP,
+        np.array([1.0, 0, 0]),
+    )
+    (plan,) = plans_of(anatomy, False, AHEAD)
+    points = body_points(anatomy, plan, is_quadruped=False).positions
+    # Rows 16 to 23 and 24 to 31 are the arms, from the tips: at x = 0.75 without the staff.
+    for row, side in ((16, 1.0), (24, -1.0)):
+        np.testing.assert_allclose(points[row], [side * 0.72, 1.0, 0.0], atol=0.08)
+
+
 def test_feet_point_to_the_front():
     anatomy = anatomy_of(*person(), UP)
     for plan in plans_of(anatomy, is_quadruped=False):

@@ -42,10 +42,16 @@ _TRUNK_PART = 0.1  # smallest part of trunk or head in the plane, as a fraction 
 _PROMINENT = 0.06  # shortest persistence of a limb, as a fraction of the size
 _OWN = 0.4  # shortest persistence of a limb, as a fraction of its length: fingers have less
 _PAIRED = 0.3  # largest difference of two limbs of a pair, as a fraction of the size
+_ARM_OF_ALL = 0.3  # length of an arm over that with what it holds, such as a staff
+_PROP = 0.2  # cost of what one limb of a pair holds, over its length
 _MOST_PAIRS = 4  # longest pairs that are considered
 
 _UPPER = (0.45, 0.95)  # part of a limb's path with the smallest radius of the upper limb
 _WIDER = 1.5  # ratio of radii at the junction with the trunk
+# Part of an arm, from the tip to the junction, that is upper arm and not yet near the armpit.
+_STRAIGHT = (0.6, 0.8)
+_BENDS = np.cos(np.radians(35.0))  # a path that bends more behind that part has left the arm
+_DEEP = 0.75  # depth of a shoulder joint as a fraction of the upper arm's radius
 _ON_GROUND = 0.12  # height of the tip of a leg, as a fraction of the figure's height
 
 _ARM = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)  # fractions of the path from tip to junction
@@ -82,8 +88,8 @@ class LimbPair:
 
     @property
     def length(self) -> float:
-        """Mean length of both."""
-        return 0.5 * (self.limbs[0].length + self.limbs[1].length)
+        """Length of the shorter one: what a hand holds makes the other longer."""
+        return min(limb.length for limb in self.limbs)
 
     @property
     def attachment(self) -> Floats:
@@ -255,7 +261,7 @@ def paired(
             cost = abs(one.length - other.length)
             cost += float(np.linalg.norm(one.attachment - other.attachment))
             cost += 0.25 * float(np.linalg.norm(one.points[0] - mirrored))
-            costs.append((cost, i, j))
+            costs.append((min(cost, _held(one, other, lateral, offset)), i, j))
     pairs: list[LimbPair] = []
     left, right = set(range(len(ours))), set(range(len(others)))
     for cost, i, j in sorted(costs):
@@ -264,6 +270,21 @@ def paired(
             right.remove(j)
             pairs.append(LimbPair((ours[i], others[j])))
     return tuple(sorted(pairs, key=lambda pair: -pair.length))
+
+
+def _held(one: Limb, other: Limb, lateral: Floats, offset: float) -> float:
+    """Return the difference of two limbs if the longer one holds something, infinite for much."""
+    arcs = {id(limb): _arc_lengths(limb.points) for limb in (one, other)}
+    shorter, longer = sorted((one, other), key=lambda limb: float(arcs[id(limb)][-1]))
+    arc, length = arcs[id(longer)], float(arcs[id(shorter)][-1])
+    if length < _ARM_OF_ALL * float(arc[-1]):
+        return np.inf
+    # The hand is as far from the plane as that of the other arm; the rest is not part of the limb.
+    hand = longer.points[int(np.searchsorted(arc, arc[-1] - length))]
+    tip = shorter.points[0]
+    mirrored = tip - 2.0 * (float(tip @ lateral) - offset) * lateral
+    gaps = np.linalg.norm(hand - mirrored) + np.linalg.norm(one.attachment - other.attachment)
+    return float(gaps) + _PROP * float(arc[-1] - length)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -355,9 +376,12 @@ def body_points(anatomy: Anatomy, plan: Plan, is_quadruped: bool) -> BodyPoints:
     order = (0, 1) if float(anatomy.lateral @ plan.left) > 0.0 else (1, 0)
     legs = [plan.lower.limbs[side] for side in order]
     arms = [plan.upper.limbs[side] for side in order]
-    upper = _leg_points if is_quadruped else _arm_points
-    rows = [_leg_points(anatomy, limb, plan.ground(anatomy.up)) for limb in legs]
-    rows += [upper(anatomy, limb, plan.ground(anatomy.up)) for limb in arms]
+    ground = plan.ground(anatomy.up)
+    rows = [_leg_points(anatomy, limb, ground) for limb in legs]
+    if is_quadruped:
+        rows += [_leg_points(anatomy, limb, ground) for limb in arms]
+    else:
+        rows += _arm_points(anatomy, arms)
     # The root of each limb is its last point; the middle of both is in the trunk.
     pelvis = 0.5 * (rows[0][-1, :3] + rows[1][-1, :3])
     chest = 0.5 * (rows[2][-1, :3] + rows[3][-1, :3])
@@ -388,21 +412,68 @@ def _arc_lengths(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _arm_points(anatomy: Anatomy, limb: Limb, _ground: float) -> Floats:
-    """Return points from the tip of an arm to its junction with the trunk: (N, 5)."""
-    lengths = _arc_lengths(limb.points)
-    fractions = lengths / max(lengths[-1], anatomy.solid.spacing)
-    upper = (fractions >= _UPPER[0]) & (fractions <= _UPPER[1])
-    last = len(fractions) - 1
-    if upper.any():
-        rows = np.flatnonzero(upper)
-        narrow = int(rows[limb.radii[rows].argmin()])
-        # Half a voxel's uncertainty must not make the thinnest arms end early.
-        least = max(float(limb.radii[narrow]), anatomy.solid.spacing)
-        wide = np.flatnonzero(limb.radii[narrow:] >= _WIDER * least)
-        last = narrow + int(wide[0]) if len(wide) else last
-    kept = slice(0, max(last, 1) + 1)
-    return _sampled(limb.points[kept], limb.radii[kept], np.array(_ARM), 1.0)
+def _arm_points(anatomy: Anatomy, limbs: list[Limb]) -> list[Floats]:
+    """Return points from the tips of two arms to their junctions with the trunk: (N, 5) each."""
+    arcs = [_arc_lengths(limb.points) for limb in limbs]
+    # Both arms are equally long: what one of them is longer, it holds in its hand. Weapons and
+    # shields also have narrow and wide places, so the junction nearer to the plane is that of both.
+    longest = min(float(arc[-1]) for arc in arcs)
+    starts = [int(np.searchsorted(arc, arc[-1] - longest)) for arc in arcs]
+    junctions = [
+        arc[-1] - arc[row]
+        for limb, arc, start in zip(limbs, arcs, starts, strict=True)
+        if (row := _junction(anatomy, limb, arc, start)) is not None
+    ]
+    inside = min(junctions, default=0.0)
+    found = []
+    for limb, arc, start in zip(limbs, arcs, starts, strict=True):
+        last = max(int(np.searchsorted(arc, arc[-1] - inside)), start + 1)
+        kept = slice(start, last + 1)
+        points, radii = _to_shoulder(anatomy, limb.points[kept], limb.radii[kept])
+        found.append(_sampled(points, radii, np.array(_ARM), 1.0))
+    return found
+
+
+def _junction(anatomy: Anatomy, limb: Limb, arc: Floats, start: int) -> int | None:
+    """Return the row of an arm's path at which it enters the trunk; None if it never widens."""
+    whole = max(float(arc[-1] - arc[start]), anatomy.solid.spacing)
+    fractions = (arc - arc[start]) / whole
+    rows = np.flatnonzero((fractions >= _UPPER[0]) & (fractions <= _UPPER[1]))
+    if len(rows) == 0:
+        return None
+    narrow = int(rows[limb.radii[rows].argmin()])
+    # Half a voxel's uncertainty must not make the thinnest arms end early.
+    least = max(float(limb.radii[narrow]), anatomy.solid.spacing)
+    wide = np.flatnonzero(limb.radii[narrow:] >= _WIDER * least)
+    return narrow + int(wide[0]) if len(wide) else None
+
+
+def _to_shoulder(anatomy: Anatomy, points: Floats, radii: Floats) -> tuple[Floats, Floats]:
+    """Return an arm's path (N, 3) with its radii (N,), extended to the shoulder along the arm.
+
+    Paths to the plane leave a lowered arm at the armpit, where arm and trunk merge. From there, the
+    axis of the upper arm leads to the shoulder: until it is as close to the plane as the path's
+    end, or about to leave the solid.
+    """
+    arc = _arc_lengths(points)
+    rows = [int(np.searchsorted(arc, part * arc[-1])) for part in _STRAIGHT]
+    upper, rest = points[rows[1]] - points[rows[0]], points[-1] - points[rows[1]]
+    lengths = float(np.linalg.norm(upper)), float(np.linalg.norm(rest))
+    if min(lengths) == 0.0 or float(upper @ rest) >= _BENDS * lengths[0] * lengths[1]:
+        return points, radii
+    solid, axis = anatomy.solid, upper / lengths[0]
+    side = np.sign(float(points[-1] @ anatomy.lateral) - anatomy.offset)
+    count = int(arc[-1] / solid.spacing) + 1
+    line = points[rows[1]] + solid.spacing * np.arange(1, count + 1)[:, None] * axis
+    depths = solid.distance[tuple(solid.voxel_of(line).T)]
+    nearer = side * (line - points[-1]) @ anatomy.lateral <= 0.0
+    ends = np.flatnonzero(nearer | (depths < _DEEP * radii[rows[1]]))
+    stop = int(ends[0]) if len(ends) else count
+    kept = rows[1] + 1
+    return (
+        np.concatenate([points[:kept], line[:stop]]),
+        np.concatenate([radii[:kept], depths[:stop]]),
+    )
 
 
 def _leg_points(anatomy: Anatomy, limb: Limb, ground: float) -> Floats:
