@@ -41,7 +41,7 @@ def main() -> None:
     for path in sorted(CHARACTERS.glob("*.npz")):
         if chosen and path.stem not in chosen:
             continue
-        truth = _truth(evaluate_rig, path)
+        truth = truth_of(evaluate_rig, path)
         if truth is None:
             continue
         cells = []
@@ -67,7 +67,7 @@ def main() -> None:
         print(f"{method}: mean deformation {mean:.3f} % (goal: {GOALS[method]} %, {verdict})")
 
 
-def _truth(evaluate_rig, path: Path):
+def truth_of(evaluate_rig, path: Path):
     """Return the artist's rig, or None if its joints have no known meaning."""
     if str(np.load(path)["family"]) not in evaluate_rig.FAM:
         return None
