@@ -20,7 +20,7 @@ from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, pose_actors
-from viewer.rigs.skinning import deform
+from viewer.rigs.skinning import deform, joint_matrices
 
 pytestmark = pytest.mark.slow
 
@@ -262,3 +262,24 @@ def test_rigged_figure_is_complete():
     assert isinstance(rigged.figure, Figure) and rigged.figure.name == "scan"
     assert rigged.figure.is_attached and rigged.figure.up == "y"
     assert rigged.figure.facts == (("rig", "transferred from arm"),)
+
+
+def test_joints_are_where_their_landmarks_are_in_the_target():
+    # The closest points of the bent arm place the joints elsewhere: the landmarks decide.
+    figure, pose = bent_arm()
+    target = moved(figure, pose)
+    rest = rest_pose(figure.skeleton)
+    own = joint_matrices(figure, rest)[:, :3, 3]
+    wanted = 30.0 * joint_matrices(figure, pose)[:, :3, 3] @ ROTATION.T + MOVE + [0.0, 0.4, -0.3]
+    end = figure.mesh.positions[-1]
+    placed = 30.0 * deform(figure, pose)[0][-1] @ ROTATION.T + MOVE
+    pairs = np.stack([np.stack([*own, end]), np.stack([*wanted, placed])], axis=1)
+    how = TransferSettings(alignment=AlignmentSettings(landmarks=pairs, samples=100))
+    rigged = transfer(figure, rest, target, how)
+    found = joint_matrices(rigged.figure, rigged.pose)[:, :3, 3]
+    assert_allclose(found, wanted, atol=1e-6 * 72.0)
+    # The rig still reproduces the mesh.
+    assert_allclose(again(rigged), target.positions, atol=1e-6 * 72.0)
+    with pytest.raises(RigError, match="expected 3 or more pairs, as no limbs were found, found 2"):
+        few = AlignmentSettings(landmarks=pairs[:2], samples=100)
+        transfer(figure, rest, target, TransferSettings(alignment=few))

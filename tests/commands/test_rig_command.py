@@ -120,6 +120,7 @@ def test_skel_rig_opens_again_and_its_pose_matches_the_target(folder, tmp_path, 
 def test_template_can_be_posed_by_the_pose_options(folder, tmp_path, capsys):
     # The alignment is worse in the rest pose of the template than in the pose of the target.
     options = ["--pose", ",".join(["0"] * 114), "--method", "robust", "--no-fit"]
+    options += ["--keep-doubtful"]
     out = tmp_path / "scan.npz"
     target = str(folder / "scan.obj")
     assert run(["rig", target, "--from", "fox", *options, "-o", str(out)]) == 0
@@ -365,8 +366,8 @@ def test_landmarks_are_points_or_posed_joints(tmp_path):
             'expected a joint of fox, found "wing"; there are 37: pelvis, spine_1, spine_2, '
             "chest, neck_1, neck_2, …",
         ),
-        ("", 1, "expected at least 3 pairs of points, found 0"),
-        ("\nhead 1 2 3\n", 2, "expected at least 3 pairs of points, found 1"),
+        ("", 1, "expected pairs of points, found none"),
+        ("\n# head 1 2 3\n", 2, "expected pairs of points, found none"),
         (
             "0 0 0 0 0 0\n1 0 0 1e-300 0 0\n0 2 0 0 1e-300 0\n",
             3,

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.posed_alignment import align_posed, keeps
 from viewer.autorig.alignment.surface_alignment import Alignment, alignment_lines
 from viewer.autorig.checks import (
     check_lines,
@@ -20,6 +20,7 @@ from viewer.autorig.checks import (
     residual_of,
     with_joint_name,
 )
+from viewer.autorig.confidence import doubts, judge, refusal
 from viewer.autorig.correspondence import Template, with_reversed_winding
 from viewer.autorig.rigged import Rigged, with_fields
 from viewer.autorig.seed import nearest
@@ -34,7 +35,7 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.progress import part_of_work, report_fraction
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import skinning_matrices, world_matrices
 from viewer.rigs.mesh import Mesh, bounding_box, box_size, vertex_normals
@@ -44,6 +45,7 @@ from viewer.rigs.skeleton import Skeleton, joint_label
 from viewer.rigs.skinning import joint_matrices
 from viewer.rigs.units import UNIT_NAMES, unit_of_scaled
 
+_AT_JOINT = 1e-6  # distance of a landmark from a joint, as a fraction of the skeleton's size
 _JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
 
 
@@ -88,8 +90,8 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     """Transfer a rig; see ``transfer``, which checks the arguments."""
     with part_of_work(span=(0.0, 0.4)):
         met = align_posed(template, pose, target, how.alignment, how.fits)
-    alignment, pose, posed = met.alignment, met.pose, met.positions
-    original, template = template.skeleton, met.figure
+    given, alignment, pose, posed = pose, met.alignment, met.pose, met.positions
+    plain, original, template = template, template.skeleton, met.figure
     aligned = alignment.similarity.apply(posed)
     with part_of_work(span=(0.4, 0.8)):
         weights = transferred_weights(
@@ -100,8 +102,9 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
             how.weights,
         )
     report_fraction(0.8, "placing the joints")
+    pinned = _pinned_joints(plain, given, how) if how.fits and keeps(how.alignment) else {}
     rest, transferred, lines = _transferred_skeleton(
-        template, original, pose, alignment, aligned, target, how
+        template, original, pose, alignment, aligned, target, how, pinned
     )
     report_fraction(0.85, "inverse skinning")
     scale = alignment.similarity.scale * pose.figure_scale
@@ -110,7 +113,12 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     joints = joint_matrices(figure, rest.pose)[:, :3, 3]
     out = newly_outside(template, pose, posed, target, joints, transferred)
     residual = residual_of(figure, rest.pose, np.eye(4), target)
+    with part_of_work(span=(0.95, 1.0)):
+        found = judge(plain, given, figure, rest.pose, target, alignment, met.solids)
+    if not how.insists and (why := refusal(found)):
+        raise RigError(why)
     lines = [
+        *doubts(found),
         *alignment_lines(alignment),
         *met.lines,
         *(with_joint_name(line, figure) for line in weights.lines),
@@ -133,6 +141,7 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
         figure_scale=pose.figure_scale,
         path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
+        findings=found,
         max_influences=how.weights.max_influences,
     )
 
@@ -145,13 +154,18 @@ def _transferred_skeleton(
     aligned: Floats,
     target: Mesh,
     how: TransferSettings,
+    pinned: dict[int, Floats],
 ) -> tuple[RestSkeleton, Bools | None, list[Diagnostic]]:
-    """Move the joints to the target; return those that were transferred, and messages."""
+    """Move the joints to the target; return those that were transferred, and messages.
+
+    ``pinned``: joints with known positions (3,).
+    """
     mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
     assert mesh is not None and skeleton is not None and skin is not None  # checked by the caller
     joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "alignment":
-        rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
+        placed = _with_pins(joints, skeleton.parents, np.zeros(len(joints), dtype=bool), pinned)
+        rest = fit_rest_skeleton(template, pose, alignment.similarity, placed, None, original)
         return rest, None, [note("R008.aligned: joints: aligned with the template")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(aligned, mesh.triangles)
@@ -166,8 +180,9 @@ def _transferred_skeleton(
         ways,
         matched,
     )
+    placed = _with_pins(found.positions, skeleton.parents, found.transferred, pinned)
     rest = fit_rest_skeleton(
-        template, pose, alignment.similarity, found.positions, found.transferred, original
+        template, pose, alignment.similarity, placed, found.transferred, original, pinned
     )
     missed = np.flatnonzero(found.measurable & ~found.transferred)
     labels = [joint_label(skeleton, joint) for joint in missed.tolist()]
@@ -193,6 +208,33 @@ def _transferred_skeleton(
             )
         ],
     )
+
+
+def _pinned_joints(template: Figure, pose: Pose, how: TransferSettings) -> dict[int, Floats]:
+    """Return the joints at which landmarks are, with the positions of these in the target."""
+    landmarks = how.alignment.landmarks
+    assert landmarks is not None  # checked by the caller
+    joints = joint_matrices(template, pose)[:, :3, 3]
+    size = box_size(bounding_box(joints))
+    found = {}
+    for point, position in landmarks:
+        gaps = np.linalg.norm(joints - point, axis=1)
+        if gaps.min() <= _AT_JOINT * size:
+            found[int(gaps.argmin())] = position
+    return found
+
+
+def _with_pins(
+    joints: Floats, parents: Ints, transferred: Bools, pinned: dict[int, Floats]
+) -> Floats:
+    """Return joints (J, 3), some at known positions; untransferred ones follow their parents."""
+    moves = np.zeros_like(joints)
+    for joint, parent in enumerate(parents.tolist()):
+        if joint in pinned:
+            moves[joint] = pinned[joint] - joints[joint]
+        elif parent >= 0 and not transferred[joint]:
+            moves[joint] = moves[parent]
+    return joints + moves
 
 
 def _at_rest(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.autorig.alignment.surface_alignment import Alignment
+from viewer.autorig.confidence import Finding
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
@@ -51,6 +52,9 @@ class Rigged:
     """Factors by which ``clip_for`` scales lengths."""
     lines: tuple[Diagnostic, ...]
     """Messages for the user."""
+    findings: tuple[Finding, ...] = ()
+    """What speaks for and against the rig; empty if the template was placed by the user, or was in
+    place for a part of a figure."""
     max_influences: int | None = None
     """Limit of the influences per vertex that was requested; None for none."""
 

@@ -93,6 +93,10 @@ class TransferSettings:
     proportions differ from the target's."""
     correctives: bool = setting(True, "omit the template's pose correctives")
     """Whether pose correctives of the template are transferred."""
+    insists: bool = setting(
+        False, "keep the rig even if it is probably wrong", flag="--keep-doubtful"
+    )
+    """Whether a rig that is probably wrong is returned, with warnings, rather than refused."""
     repairs: bool = True
     """Whether the neighbourhoods of singular vertices are smoothed."""
 

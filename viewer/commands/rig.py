@@ -129,7 +129,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(group, TransferSettings, "method", given=None, usual=usual)
     add_settings(group, MatchSettings)
     add_settings(group, WeightSettings)
-    add_settings(group, TransferSettings, "joints", "fits", "correctives")
+    add_settings(group, TransferSettings, "joints", "fits", "correctives", "insists")
     add_settings(group, SkeletonSettings)
     group = parser.add_argument_group("alignment")
     add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
@@ -137,8 +137,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--landmarks",
         metavar="FILE",
-        help="file with three or more pairs of points, one per line: a joint or position of the "
-        "posed template, and a position on the target",
+        help="file with pairs of points, one per line: a joint or position of the posed template, "
+        "and a position on the target; the fit keeps them together",
     )
     add_settings(group, AlignmentSettings, "refines")
     add_vrm_arguments(parser)
@@ -475,7 +475,7 @@ def _settings(
 
 
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
-    """Read at least three pairs of points: on the posed template and on the target, (N, 2, 3)."""
+    """Read pairs of points: on the posed template and on the target, (N, 2, 3)."""
     skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
     pairs = []
@@ -501,14 +501,13 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
             raise _unknown_joint(source, line_number, name, template)
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
     last = max(len(source.data.splitlines()), 1)
-    if len(pairs) < 3:
+    if not pairs:
         raise FormatError.fault(
-            "F002.landmarks: expected at least 3 pairs of points, found {found}",
-            source.path,
-            last,
-            found=len(pairs),
+            "F002.landmarks: expected pairs of points, found none", source.path, last
         )
     points = np.array(pairs, dtype=np.float64)
+    if len(points) == 1:
+        return points
     own, other = np.ptp(points, axis=0).max(axis=1).tolist()
     if not (own < _LARGEST_SCALE * other and other < _LARGEST_SCALE * own):
         raise FormatError.fault(

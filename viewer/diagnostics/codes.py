@@ -269,6 +269,14 @@ CODES: dict[str, Code] = {
         "parts of the mesh without joints",
         Remedy("choose a skeleton as template", "specify --skeleton"),
     ),
+    "R017": Code(
+        "warning",
+        "rig that is probably wrong",
+        Remedy(
+            "align the template by hand or by landmarks, or choose another template",
+            "specify --up, --facing or --landmarks, or use another template",
+        ),
+    ),
     # Comparison
     "D001": Code(
         "warning", "part without a counterpart", "compare files of the same figure and motion"

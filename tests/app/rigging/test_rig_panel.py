@@ -14,11 +14,14 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
+from viewer.app.rigging import work
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
+from viewer.autorig.confidence import Finding
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.motion.clip import sample
@@ -216,6 +219,30 @@ def test_report_states_how_the_alignment_was_found(rigging, texts):
     assert [line.key for line in rigged.lines[:5]] == keys
     assert str(rigged.lines[0].values["how"]) == "found by fitting pose and proportions"
     assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
+
+
+def test_rig_that_is_probably_wrong_is_kept_or_discarded(rigging, texts, monkeypatch):
+    doubt = Finding("R017.inside: only {value:.0%} of the bones are inside the mesh", 0.2, 0.3, 0.7)
+    monkeypatch.setattr(work, "judge", lambda *_: (doubt,))
+    hand = rigging(placed=False)
+    hand.click("Align")
+    hand.finish_job()
+    for answer in ("Keep it", "Discard it"):
+        hand.click("Run")
+        hand.finish_job()
+        texts.clear()
+        hand.step(2)
+        assert "only 20% of the bones are inside the mesh" in texts
+        hand.click("Save rigged…")
+        assert hand.state.of(Files).dialog is None  # disabled until the question is answered
+        hand.click(answer)
+        texts.clear()
+        hand.step(2)
+        assert "only 20% of the bones are inside the mesh" not in texts
+        is_kept = answer == "Keep it"
+        assert names(hand) == (["scan rigged", "arm", "scan"] if is_kept else ["scan", "arm"])
+        assert visible(hand) == (["scan rigged", "arm"] if is_kept else ["scan", "arm"])
+    hand.assert_sane()
 
 
 def test_stats_include_the_rigged_mesh(rigging, texts):

@@ -152,7 +152,8 @@ def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):
     figure, _, mesh = bent(target)
     half = bent(reached)[1]
     monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_, **__: fit_of(figure, half, reached))
-    found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False, samples=250)
+    how = {"landmarks": LANDMARKS, "keeps_landmarks": False, "refines": False, "samples": 250}
+    found, own = aligned(figure, mesh, **how)
     assert tuple(re.sub(r"\d+\.\d+", "G", line.labelled) for line in found.lines) == lines
     assert (found.pose is own) == ("not fitted" in lines[0])
 

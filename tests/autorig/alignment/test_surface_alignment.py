@@ -136,7 +136,7 @@ def test_progress_increases():
     ("settings", "message"),
     [
         ({"scale": "some"}, 'scale: expected uniform, axes, none, found "some"'),
-        ({"landmarks": np.zeros((2, 2, 3))}, "landmarks: expected 3 or more pairs, found 2"),
+        ({"landmarks": np.zeros((0, 2, 3))}, "landmarks: expected 1 or more pairs, found 0"),
         ({"landmarks": np.zeros((3, 3))}, "landmarks: expected shape any x 2 x 3, found 3 x 3"),
     ],
 )

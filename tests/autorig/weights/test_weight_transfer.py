@@ -571,17 +571,17 @@ def test_match_report_counts_vertices():
 
 
 def test_match_report_mentions_exceptions():
-    found = matches([True, False, False, False], [0, 2])
+    found = matches([True, *[False] * 7], [0, 2])
     lines = [*match_lines(found, ~found.matched, "harmonic")]
     assert told(lines) == [
-        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "inpainted": 3}),
-        ("R006.matched", {"limit": 0.75}),
+        ("R005.matched", {"n": 1, "all": 8, "ratio": 0.125, "inpainted": 7}),
+        ("R006.matched", {"limit": 0.2}),
         ("R005.reversed", {"n": 2}),
         ("R005.solver", {"method": "harmonic"}),
     ]
     assert [line.severity for line in lines] == ["note", "warning", "note", "note"]
     assert lines[1].labelled == (
-        "warning: less than 75% of the target matches the template: check the "
+        "warning: less than 20% of the target matches the template: check the "
         "alignment or allow a larger distance"
     )
 

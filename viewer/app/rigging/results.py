@@ -21,12 +21,14 @@ from viewer.app.core.widgets import (
     note_item,
     radio,
     same_line_if_room,
+    warning,
     with_key,
 )
 from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Comparison, Result, Rigging, is_intact, no_results
+from viewer.autorig.confidence import doubts
 from viewer.autorig.rigged import clip_for
 from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
@@ -322,6 +324,7 @@ def draw_results(state: AppState) -> None:
             "Its joints were edited: File > Export saves it." if is_edited else redone
         )
         return
+    _draw_question(state, result)
     shown = _shown_version(state)
     for number, name in enumerate(_versions(state)):
         text = "original" if name == TARGET else name
@@ -343,7 +346,7 @@ def draw_results(state: AppState) -> None:
     if chosen != tries:
         _set_trial(state, result, chosen)
     _draw_table(state)
-    if button(state, "Save rigged…", no_job_room(state)):
+    if button(state, "Save rigged…", _no_answer(state, result) or no_job_room(state)):
         ask_where_to_save_rig(state, result)
     same_line_if_room("Copy report")
     if button(state, "Copy report"):
@@ -356,6 +359,43 @@ def draw_results(state: AppState) -> None:
                 imgui.text_wrapped(printable(line.labelled, 400))
     imgui.end_child()
     note_item(state, "report")
+
+
+def _no_answer(state: AppState, result: Result) -> str:
+    """Return the reason why a result cannot be used: a question about it is open."""
+    rigged = result.rigged
+    if any(rigged is kept for kept in state.of(Rigging).accepted) or not [*doubts(rigged.findings)]:
+        return ""
+    return "decide first whether to keep this rig"
+
+
+def _draw_question(state: AppState, result: Result) -> None:
+    """Ask whether to keep a rig that is probably wrong."""
+    if not _no_answer(state, result):
+        return
+    warning("Is this rig right? It is probably wrong:")
+    for line in doubts(result.rigged.findings):
+        imgui.bullet()
+        imgui.text_wrapped(str(line))
+    imgui.text_wrapped("If so, align by landmarks, or choose another template.")
+    if button(state, "Keep it"):
+        state.of(Rigging).accepted.append(result.rigged)
+    same_line_if_room("Discard it")
+    if button(state, "Discard it"):
+        discard(state, result)
+
+
+def discard(state: AppState, result: Result) -> None:
+    """Remove a result from the scene, and show the original mesh."""
+    view, actors = state.of(Rigging), state.scene.actors
+    row, target = _row(actors, result.actor), result.target
+    # The target has moved to the end of the list; it returns to the place of the result.
+    del actors[_row(actors, target)]
+    actors[row] = target
+    del view.results[result.method]
+    view.comparison, target.visible = None, True
+    state.choose_actor(row)
+    state.say_status("The rig was discarded")
 
 
 def _draw_colors(state: AppState) -> None:

@@ -388,7 +388,8 @@ def _refine(state: AppState) -> None:
     corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
     corners[1:] += (high == low) * np.eye(3)  # keeps the four corners of flat meshes distinct
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
-    start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
+    scale = rigging.choices.scale
+    start_align(state, AlignmentSettings(landmarks=pairs, scale=scale, keeps_landmarks=False))
 
 
 def _draw_numbers(state: AppState, template: Template) -> None:

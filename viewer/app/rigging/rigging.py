@@ -223,6 +223,8 @@ class Rigging:
     """Latest result of each method, all for the same target."""
     comparison: Comparison | None = None
     """Comparison of the results of both methods."""
+    accepted: list[Rigged] = field(default_factory=list)
+    """Results that are probably wrong, but that the user keeps."""
     scrolls: int = 0
     """Number of frames in which the panel still scrolls to the result."""
     ghost_key: object = None

@@ -37,6 +37,7 @@ from viewer.autorig.alignment.surface_alignment import (
     alignment_lines,
     stated_up,
 )
+from viewer.autorig.confidence import doubts, judge
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.curve_skeleton import find_skeleton
@@ -52,10 +53,10 @@ from viewer.phrases import printable
 from viewer.progress import part_of_work, report
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Floats
-from viewer.rigs.figure import figure_pose
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.ray_hit import surface_point
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
-from viewer.rigs.pose import pose_key
+from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.scene import Actor, free_title
 from viewer.rigs.shape import shaped
 from viewer.rigs.skinning import deform
@@ -320,7 +321,7 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
             called = f"{name} {_CALLED[method]}"
             with part_of_work(f"{printable(name, 40)}, {method}", (low, high)):
                 rigged = transfer(aligned.figure, aligned.pose, mesh, settings, called)
-            rigged = _with_known_method(rigged, found)
+            rigged = _with_known_method(rigged, found, own or template, mesh)
             rigged = replace(rigged, lines=(*template.lines, *rigged.lines))
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
@@ -344,9 +345,7 @@ def align_template(
     fits: bool,
 ) -> Placing:
     """Align a template with a target; raises ``RigError`` as ``align`` does."""
-    plain = template.pose.copy()
-    plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
-    figure = shaped(template.figure, template.pose.shape_weights)
+    figure, plain = _unshaped(template)
     found = align_posed(figure, plain, target, settings, fits)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
     is_fitted = is_other or bool(found.lines)
@@ -361,17 +360,31 @@ def align_template(
     )
 
 
-def _with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
-    """Return a result whose report names the alignment method, if the alignment was given."""
+def _with_known_method(
+    rigged: Rigged, placing: Placing | None, template: Template, target: Mesh
+) -> Rigged:
+    """Return a result whose report names the alignment method, if the alignment was given.
+
+    ``template``: as chosen, before it was fitted; the rig is judged by it.
+    """
     known = placing.alignment if placing is not None else None
     if placing is None or known is None or rigged.alignment is None:
         return rigged
     if rigged.alignment.how != "given":
         return rigged  # the transfer has aligned the template itself
-    known_alignment = replace(rigged.alignment, how=known.how)
+    known_alignment = replace(rigged.alignment, how=known.how, has_limbs=known.has_limbs)
+    figure, pose = _unshaped(template)
+    found = judge(figure, pose, rigged.figure, rigged.pose, target, known_alignment)
     rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
-    lines = (*alignment_lines(known_alignment), *placing.lines, *rest)
-    return replace(rigged, alignment=known_alignment, lines=lines)
+    lines = (*doubts(found), *alignment_lines(known_alignment), *placing.lines, *rest)
+    return replace(rigged, alignment=known_alignment, lines=lines, findings=found)
+
+
+def _unshaped(template: Template) -> tuple[Figure, Pose]:
+    """Return a template whose shape is part of its mesh, and its pose."""
+    plain = template.pose.copy()
+    plain.shape_weights = np.zeros(0)
+    return shaped(template.figure, template.pose.shape_weights), plain
 
 
 def _match_fields(
@@ -418,5 +431,6 @@ def _transfer_settings(
         ),
         joints=choices.joints,
         fits=False,  # the template was fitted during the alignment
+        insists=True,  # the panel asks whether to keep a rig that is probably wrong
         correctives=choices.correctives,
     )

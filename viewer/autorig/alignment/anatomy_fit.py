@@ -43,9 +43,14 @@ from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skin import owners, skin_from_entries, weight_sums
 from viewer.rigs.skinning import deform
 
+NO_LANDMARKS = np.zeros((0, 2, 3))
+"""Pairs of points of template and target, (N, 2, 3)."""
 _AROUND = 1.3  # vertices around a point, up to this multiple of the distance from the surface
 _FEWEST = 8  # minimum number of vertices whose weights a point gets
-_STRENGTH = 1.0  # of marks when nothing else is fitted
+# Weights of the marks when nothing else is fitted: their sum, and that of each landmark.
+_ALL_MARKS, _LANDMARK = 1.0, 0.5
+FADED = 0.1
+"""Fraction of the weight of a point of the anatomy at the end of a fit to surfaces."""
 _USUAL_FRONT = np.array([0.0, 0.0, 1.0])
 _SURE_FEET = 0.03  # reach of feet over the height, above which it decides the facing
 _GIRTHS = (np.log(0.25), np.log(4.0))  # limits of the logarithms of girths
@@ -111,8 +116,13 @@ def left_of(figure: Figure, pose: Pose) -> Floats:
     return np.cross(axis_direction(figure.up), axis_direction(front or stated_front(figure.up)))
 
 
-def starts_of(body: TemplateBody, target: Anatomy, front: Floats | None) -> list[Start]:
-    """Return a start for each likely plan of the target, the one with the least error first."""
+def starts_of(
+    body: TemplateBody, target: Anatomy, front: Floats | None, landmarks: Floats = NO_LANDMARKS
+) -> list[Start]:
+    """Return a start for each likely plan of the target, the one with the least error first.
+
+    ``landmarks``: (N, 2, 3), points of the template and of the target that coincide.
+    """
     plans = plans_of(target, body.is_quadruped, front)
     found = []
     for number, plan in enumerate(plans):
@@ -120,22 +130,33 @@ def starts_of(body: TemplateBody, target: Anatomy, front: Floats | None) -> list
         # Feet point to the front; stumps and hooves say little.
         feet = feet_ahead(target, plan, body.is_quadruped)
         if front is not None or feet >= -_SURE_FEET:
-            found.append(_start(body, target, plan, front is not None or feet > _SURE_FEET))
+            is_sure = front is not None or feet > _SURE_FEET
+            found.append(_start(body, target, plan, is_sure, landmarks))
     return sorted(found, key=lambda start: start.error)
 
 
-def _start(body: TemplateBody, target: Anatomy, plan: Plan, is_sure: bool) -> Start:
+def _start(
+    body: TemplateBody, target: Anatomy, plan: Plan, is_sure: bool, landmarks: Floats
+) -> Start:
     points = body_points(target, plan, body.is_quadruped)
     own = body.points
     common = np.isfinite(own.positions).all(axis=1) & np.isfinite(points.positions).all(axis=1)
     ours, theirs = own.positions[common], points.positions[common]
     weights = np.minimum(own.weights, points.weights)[common]
     similarity = _similarity(body, target, plan, ours, theirs, weights)
-    size = target.size
+    size, count = target.size, len(ours)
+    reach = np.zeros(count + len(landmarks))
+    reach[:count] = _AROUND * own.radii[common] + body.anatomy.solid.spacing
     marked, vertices = with_marks(
-        body, ours, _AROUND * own.radii[common] + body.anatomy.solid.spacing
+        body.figure, body.pose, body.positions, np.concatenate([ours, landmarks[:, 0]]), reach
     )
-    marks = Marks(vertices, theirs, weights, _STRENGTH)
+    shares = _ALL_MARKS * weights / weights.sum()
+    marks = Marks(
+        vertices,
+        np.concatenate([theirs, landmarks[:, 1]]),
+        np.concatenate([shares, np.full(len(landmarks), _LANDMARK)]),
+        np.repeat([FADED, 1.0], [count, len(landmarks)]),
+    )
     few, limbs = _only(marked, limbs_of(marked), vertices)
     alone = replace(marks, vertices=np.arange(len(vertices), dtype=np.int32))
     fitted = fit_marks(few, start_of(few, body.pose, similarity), limbs, alone, size)
@@ -143,7 +164,9 @@ def _start(body: TemplateBody, target: Anatomy, plan: Plan, is_sure: bool) -> St
     ratios = np.log(
         np.maximum(points.radii[common], thin[1]) / np.maximum(own.radii[common], thin[0])
     ) - np.log(fitted.similarity.scale)
-    grown = np.stack([fitted.grown[0], _girths(marked, limbs, ratios)])
+    # Landmarks have no radius.
+    seen = replace(limbs, weights=limbs.weights[:count])
+    grown = np.stack([fitted.grown[0], _girths(marked, seen, ratios)])
     fitted = replace(fitted, grown=grown, figure=resized(few, limbs, *np.exp(grown)))
     # Thicker limbs move the points near their ends a little.
     fitted = fit_marks(few, fitted, limbs, alone, size)
@@ -194,20 +217,40 @@ def _similarity(
     return Similarity(scale, rotation, to_mean - scale * rotation @ from_mean, np.ones(3))
 
 
-def with_marks(body: TemplateBody, points: Floats, reach: Floats) -> tuple[Figure, Ints]:
+def start_of_landmarks(
+    figure: Figure, pose: Pose, positions: Floats, landmarks: Floats, similarity: Similarity
+) -> tuple[Figure, Fitted, Marks]:
+    """Return a template with landmarks (N, 2, 3) as marks, and fitted to them.
+
+    ``positions``: (V, 3), its posed vertices; ``similarity``: fitted to the landmarks.
+    """
+    points, targets = landmarks[:, 0], landmarks[:, 1]
+    marked, vertices = with_marks(figure, pose, positions, points, np.zeros(len(points)))
+    marks = Marks(vertices, targets, np.full(len(points), _LANDMARK), np.ones(len(points)))
+    few, limbs = _only(marked, limbs_of(marked), vertices)
+    alone = replace(marks, vertices=np.arange(len(vertices), dtype=np.int32))
+    size = similarity.scale * float(np.ptp(positions, axis=0).max())
+    fitted = fit_marks(few, start_of(few, pose, similarity), limbs, alone, size)
+    whole = resized(marked, limbs_of(marked), *np.exp(fitted.grown))
+    return marked, replace(fitted, figure=whole), marks
+
+
+def with_marks(
+    figure: Figure, pose: Pose, positions: Floats, points: Floats, reach: Floats
+) -> tuple[Figure, Ints]:
     """Return a template with points (P, 3) of its posed body as vertices, and their numbers.
 
-    Each gets the mean weights of the vertices within its ``reach`` (P,), in the figure's unit; a
-    point at a joint is attached to that joint.
+    ``positions``: (V, 3), the posed vertices. Each point gets the mean weights of the vertices
+    within its ``reach`` (P,), in the figure's unit; a point at a joint is attached to that joint.
     """
     from scipy import spatial
 
-    mesh, skeleton, skin = body.figure.attached()
-    world = placement_matrix(body.pose) @ world_matrices(skeleton, body.pose)
+    mesh, skeleton, skin = figure.attached()
+    world = placement_matrix(pose) @ world_matrices(skeleton, pose)
     palette, joints = skinning_matrices(world, skin.inverse_bind), world[:, :3, 3]
     used = np.unique(mesh.triangles)
-    tree = spatial.cKDTree(body.positions[used])
-    size = float(np.ptp(body.positions[used], axis=0).max())
+    tree = spatial.cKDTree(positions[used])
+    size = float(np.ptp(positions[used], axis=0).max())
     of, sums = owners(skin), weight_sums(skin)
     shares = skin.weights / np.where(sums > 0.0, sums, 1.0)[of]
     table = np.zeros((len(points), skin.n_joints))
@@ -234,10 +277,10 @@ def with_marks(body: TemplateBody, points: Floats, reach: Floats) -> tuple[Figur
         np.concatenate([skin.weights, table[rows, columns]]),
         skin.inverse_bind,
     )
-    positions = np.concatenate([mesh.positions, rest])
+    vertices = np.concatenate([mesh.positions, rest])
     normals = np.concatenate([mesh.normals, np.zeros_like(rest)])
-    marked = Mesh(positions, normals, mesh.triangles)
-    plain = Figure(body.figure.name, marked, skeleton, grown, up=body.figure.up)
+    marked = Mesh(vertices, normals, mesh.triangles)
+    plain = Figure(figure.name, marked, skeleton, grown, up=figure.up)
     return plain, np.arange(count, count + len(points), dtype=np.int32)
 
 

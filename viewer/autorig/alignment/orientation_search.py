@@ -6,12 +6,12 @@ from itertools import permutations, product
 
 import numpy as np
 
-from viewer.autorig.alignment.icp import Cloud, gaps_between, iterate
+from viewer.autorig.alignment.icp import Cloud, Side, gaps_between, iterate
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import SurfaceSamples
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.progress import report_fraction
+from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
@@ -113,6 +113,23 @@ def search(
     scale: float | None,
 ) -> Candidate:
     """Return the best candidate after a few iterations for each, and more for the best four."""
+    with part_of_work(span=(0.0, 0.6)):
+        found = quick_search(template, target, rotations, scale)
+    best = []
+    for index, finalist in enumerate(found[:_FINALISTS]):
+        similarity = iterate(template, target, finalist.similarity, _LONG, scales=scale is None)
+        best.append(judge(template, target, similarity))
+        report_fraction(0.6 + 0.4 * (index + 1) / _FINALISTS)
+    return min(best, key=lambda candidate: candidate.error)
+
+
+def quick_search(
+    template: Cloud,
+    target: Cloud,
+    rotations: list[Floats],
+    scale: float | None,
+) -> list[Candidate]:
+    """Return the candidates after a few iterations with a few samples, the best one first."""
     ours, theirs = template.samples.positions, target.samples.positions
     # Unlike box sizes, distances from the centroid do not depend on the orientation of a mesh.
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale
@@ -123,17 +140,11 @@ def search(
         begun = Similarity(start, rotation, shift, np.ones(3))
         similarity = iterate(few[0], few[1], begun, _QUICK, scales=scale is None)
         found.append(judge(few[0], few[1], similarity))
-        report_fraction(0.6 * (index + 1) / len(rotations))
-    best = []
-    finalists = sorted(found, key=lambda candidate: candidate.error)[:_FINALISTS]
-    for index, finalist in enumerate(finalists):
-        similarity = iterate(template, target, finalist.similarity, _LONG, scales=scale is None)
-        best.append(judge(template, target, similarity))
-        report_fraction(0.6 + 0.4 * (index + 1) / len(finalists))
-    return min(best, key=lambda candidate: candidate.error)
+        report_fraction((index + 1) / len(rotations))
+    return sorted(found, key=lambda candidate: candidate.error)
 
 
-def judge(template: Cloud, target: Cloud, similarity: Similarity) -> Candidate:
+def judge(template: Side, target: Side, similarity: Similarity) -> Candidate:
     """Return an alignment with its two-way error."""
     gaps = gaps_between(template, target, similarity)
     both = _trimmed_mean(gaps.towards) + _trimmed_mean(gaps.away)

@@ -37,7 +37,7 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
 from viewer.progress import report_fraction
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import (
     matrix_to_euler,
@@ -67,7 +67,8 @@ _HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
 
 # Penalties on the squares of total rotations (radians) and total growths (logarithms).
 _ROTATED, _GROWN = 3e-6, 3e-5
-_TWISTED = 1e-4  # the former if there are marks
+# The former if there are marks: for bending, and for twisting a limb about its own axis.
+_BENDING, _TWISTING = 3e-5, 1e-4
 _NOW = 1e-5  # penalty on rotations and growths within one iteration
 _WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
 
@@ -102,9 +103,16 @@ class Marks:
     targets: Floats
     """(M, 3)."""
     weights: Floats
-    """(M,). Relative to each other; the mean over all marks counts as much as ``strength``."""
-    strength: float
-    """Weight relative to the sums over surfaces."""
+    """(M,). Of the squared gaps, relative to their mean over the surfaces."""
+    kept: Floats
+    """(M,). Fractions of the weights that are left at the end of a fit to surfaces; 1 for
+    landmarks."""
+
+    def chosen(self, rows: Bools) -> Marks | None:
+        """Return some of the marks, (M,) bool; None for none."""
+        if not rows.any():
+            return None
+        return Marks(self.vertices[rows], self.targets[rows], self.weights[rows], self.kept[rows])
 
 
 def start_of(template: Figure, pose: Pose, similarity: Similarity) -> Fitted:
@@ -136,17 +144,17 @@ def fit_pose(
     scales: bool,
     marks: Marks | None = None,
     reach: float = _FAR,
-    fades: float = 1.0,
+    since: Fitted | None = None,
 ) -> Fitted:
     """Rotate a template's joints and scale its limbs, both sides alike, to match the target.
 
     ``reach``: search radius at the beginning over the size, smaller if the start is close.
-    ``fades``: fraction of the marks' strength at the end.
+    ``since``: the state in which nothing is rotated or grown yet, by default ``start``.
     """
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
     chosen = even_vertices(mesh.positions, mesh.triangles, _VERTICES)
-    state = start
+    state, since = start, since or start
     for number in range(_ROUNDS):
         report_fraction(number / _ROUNDS, "fitting pose and proportions")
         aligned = _aligned_template(state, limbs)
@@ -156,8 +164,8 @@ def fit_pose(
         if len(pairs.vertices) < _FEWEST:
             break
         parents, size = skeleton.parents, target.size
-        total = (state.rotated - start.rotated, state.grown - start.grown)
-        faded = marks if marks is None else replace(marks, strength=marks.strength * fades**late)
+        total = (state.rotated - since.rotated, state.grown - since.grown)
+        faded = marks and replace(marks, weights=marks.weights * marks.kept**late)
         step = solve_step(aligned, limbs, parents, pairs, size, *total, scales, faded)
         state = _moved(template, limbs, state, step)
         if late == 1.0 and np.abs(step.rotation_vectors).max(initial=0.0) < _STILL:
@@ -330,16 +338,16 @@ def solve_step(
             right += _HOLD * values
         matrix, right = matrix / len(pairs.vertices), right / len(pairs.vertices)
     if marks is not None:
-        factor = marks.strength / float(marks.weights.sum())
         for axis in np.eye(3):
             normals = np.broadcast_to(axis, marks.targets.shape)
             more, values = _equations(
-                frame, marks.vertices, marks.targets, normals, np.sqrt(factor * marks.weights)
+                frame, marks.vertices, marks.targets, normals, np.sqrt(marks.weights)
             )
             matrix += more
             right += values
     # Marks along a limb leave its rotation about its own axis to chance, as a round head does.
-    penalty = _penalties(len(below), n_joints, _ROTATED if marks is None else _TWISTED)
+    both = (_ROTATED, _ROTATED) if marks is None else (_BENDING, _TWISTING)
+    penalty = _penalties(aligned.axes[below], n_joints, *both)
     right[7:] -= penalty @ np.concatenate([rotated[below].ravel(), grown.ravel()])
     matrix[7:, 7:] += penalty
     now = np.full(len(right), _NOW)
@@ -358,9 +366,17 @@ def solve_step(
     return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
 
-def _penalties(n_rotating: int, n_joints: int, rotated: float) -> Floats:
-    """Return the penalties on all rotations and growths as a quadratic form."""
-    penalties = np.diag(np.repeat([rotated, _GROWN], [3 * n_rotating, 2 * n_joints]))
+def _penalties(axes: Floats, n_joints: int, bending: float, twisting: float) -> Floats:
+    """Return the penalties on all rotations and growths as a quadratic form.
+
+    ``axes``: unit vectors along the limbs of the rotating joints, (R, 3).
+    """
+    count = len(axes)
+    penalties = np.diag(np.repeat([bending, _GROWN], [3 * count, 2 * n_joints]))
+    # b |w|^2 + (t - b) (a . w)^2 for a rotation w of the limb with the axis a.
+    own = (twisting - bending) * np.einsum("ja,jb->jab", axes, axes)
+    for joint, block in enumerate(own):
+        penalties[3 * joint : 3 * joint + 3, 3 * joint : 3 * joint + 3] += block
     # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised. All limbs
     # become thicker under clothes; otherwise the figure as a whole would grow instead, and extend
     # beyond the target.

@@ -1,25 +1,34 @@
 """Alignment of a template whose pose and proportions differ from the target's.
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
-similarity aligns one with the other. If the alignment leaves a large error, pose and proportions
-are therefore fitted too: from that alignment, and from the limbs of the target (``anatomy_fit``) if
-it has those of the template. The fit with the least distance between the surfaces, in both
-directions, is accepted if it removes most of the error. Feet decide which way a figure faces; if
-they are stumps, both facings are fitted.
+similarity aligns one with the other. Unless the shapes are nearly the same, pose and proportions
+are therefore fitted from the limbs of the target (``anatomy_fit``) if it has those of the template.
+If not, or if the fit is poor, a similarity is searched and pose and proportions are fitted from
+there; the fit with the least distance between the surfaces, in both directions, is accepted if it
+removes most of the error. Feet decide which way a figure faces; if they are stumps, both facings
+are fitted.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from viewer.autorig.alignment.anatomy_fit import Start, left_of, starts_of, template_body
+from viewer.autorig.alignment.anatomy_fit import (
+    NO_LANDMARKS,
+    Start,
+    left_of,
+    start_of_landmarks,
+    starts_of,
+    template_body,
+)
 from viewer.autorig.alignment.icp import Cloud, Triangles, iterate
 from viewer.autorig.alignment.orientation_search import axis_direction
-from viewer.autorig.alignment.pose_fit import Fitted, fit_pose, start_of
+from viewer.autorig.alignment.pose_fit import Fitted, Marks, fit_pose, start_of
 from viewer.autorig.alignment.proportions import limbs_of, resized
-from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.alignment.surface_alignment import (
     DEFAULT_UP,
     PART,
@@ -29,14 +38,17 @@ from viewer.autorig.alignment.surface_alignment import (
     Posed,
     align,
     misfit,
+    nearly_similar,
 )
 from viewer.autorig.anatomy import anatomy_of
+from viewer.autorig.solid import Solid
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
+from viewer.errors import RigError
 from viewer.phrases import Remedy
 from viewer.progress import part_of_work
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import Up
@@ -52,17 +64,19 @@ _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first value, after a joint was rotated by more than the second, indicates a
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
+_ENOUGH = 0.03  # misfit of fitted limbs up to which no other alignment is tried
 _ROUNDS = 30  # number of iterations to align the template facing the other way
 _FOUND = ("search", "in place")  # origins of alignments that were not given by the user
 
 _FACING = Remedy("Facing", "--facing")
 _CLEARLY = 0.85  # fraction of the misfit that an unusual facing must reach
 _STRAIGHTER = 0.75  # ratio of bends below which the straighter start is right
+_FEWEST_LANDMARKS = 3  # from which a similarity follows
 _MOST_STARTS = 2  # starts from anatomy that are fitted to the surface
 _NEARBY = 0.08  # ratio of the search radius to the size at the beginning of such a fit
 _CLOSER = 0.03  # the same ratio for a fit to the surface only
-# Strength of the points of the anatomy relative to the surface, and the fraction left at the end.
-_MARKED, _FADES = 0.3, 0.1
+# Weight of all points of the anatomy relative to the surface; landmarks keep their weights.
+_MARKED = 0.3
 _ALIKE = "R004.facing: front and back look alike: check the front, or specify {remedy}"
 
 
@@ -82,6 +96,8 @@ class PosedAlignment:
     """Messages about changes to pose and proportions, and about better options."""
     most_rotated: tuple[float, str] = (0.0, "")
     """The largest joint rotation in radians, and the joint's name; (0, "") if none."""
+    solids: tuple[Solid, Solid] | None = None
+    """The solids of the template in the given pose and of the target, if they were looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +110,10 @@ class _Job:
     exact: Triangles
     scales: bool
     settings: AlignmentSettings
+
+
+_LimbFit: TypeAlias = tuple[Start, PosedAlignment]
+"""A start from anatomy, and the fit that began there."""
 
 
 def align_posed(
@@ -114,58 +134,103 @@ def align_posed(
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # outward normals distinguish the two sides of a limb
     theirs = Posed(target.positions, triangles)
-    with part_of_work(span=(0.0, 0.3)):
+    job = _job(template, pose, target.positions, triangles, settings)
+    if fits and keeps(settings):
+        return _by_landmarks(job, ours, theirs)
+    by_limbs: list[_LimbFit] = []
+    solids: tuple[Solid, Solid] | None = None
+    # Whoever gives a place or a scale knows better; and equal shapes need no other fit.
+    is_searched = settings.matrix is None and settings.landmarks is None
+    has_limbs = fits and is_searched and settings.scale == "uniform"
+    with part_of_work(span=(0.0, 0.05)):
+        is_new = has_limbs and not nearly_similar(ours, theirs, template.up, settings)
+    if is_new:
+        with part_of_work(span=(0.05, 0.5)):
+            starts, solids = _starts(job, ours, theirs)
+            by_limbs = _fits_of_limbs(job, starts)
+        found = _best_of_limbs(by_limbs)
+        if found is not None and misfit(found.alignment, False) <= _ENOUGH:
+            return replace(found, solids=solids)
+    with part_of_work(span=(0.5, 0.7)):
         rigid = align(ours, theirs, template.up, settings)
-    kept = PosedAlignment(rigid, template, pose, posed, ())
-    gap = misfit(rigid, rigid.away > PART)
-    if settings.scale == "axes" or gap <= _CLOSE or not fits:
+    kept = PosedAlignment(rigid, template, pose, posed, (), solids=solids)
+    if settings.scale == "axes" or not fits or misfit(rigid, rigid.away > PART) <= _CLOSE:
         return kept
-    exact = Triangles(target.positions, triangles, settings.samples)
-    dense = sample_surface(target.positions, triangles, settings.dense)
-    cloud = Cloud(exact.samples, dense)
-    scales = settings.scale != "none"
-    job = _Job(template, pose, cloud, exact, scales, settings)
-    starts: list[Start] = []
-    if rigid.how in _FOUND and scales:
-        with part_of_work(span=(0.3, 0.45)):
-            starts = _starts(job, ours, theirs)
-    return _best(job, ours, kept, starts)
+    if has_limbs and not is_new and rigid.how in _FOUND:
+        with part_of_work(span=(0.7, 0.8)):
+            starts, solids = _starts(job, ours, theirs)
+            by_limbs = _fits_of_limbs(job, starts)
+    with part_of_work(span=(0.8, 1.0)):
+        return replace(_best(job, ours, kept, by_limbs), solids=solids)
 
 
-def _starts(job: _Job, ours: Posed, theirs: Posed) -> list[Start]:
-    """Return the starts from anatomy, none if template or target has no two pairs of limbs."""
+def keeps(settings: AlignmentSettings) -> bool:
+    """Return whether landmarks are constraints of the fit."""
+    is_free = settings.scale == "uniform" and settings.matrix is None
+    return settings.landmarks is not None and settings.keeps_landmarks and is_free
+
+
+def _by_landmarks(job: _Job, ours: Posed, theirs: Posed) -> PosedAlignment:
+    """Return the closest fit that keeps the landmarks: from limbs, or from the landmarks alone."""
+    landmarks = job.settings.landmarks
+    assert landmarks is not None  # checked by the caller
     with part_of_work(span=(0.0, 0.4)):
+        starts, solids = _starts(job, ours, theirs, landmarks)
+    fits = []
+    for number, start in enumerate(starts[:_MOST_STARTS]):
+        with part_of_work(span=(0.4 + 0.2 * number, 0.6 + 0.2 * number)):
+            fits.append(_fitted_limbs(job, start))
+    if len(landmarks) >= _FEWEST_LANDMARKS:
+        placed = fit_similarity(landmarks[:, 0], landmarks[:, 1])
+        alone = start_of_landmarks(job.template, job.pose, ours.positions, landmarks, placed)
+        with part_of_work(span=(0.8, 1.0)):
+            fits.append(_fitted_marks(job, *alone))
+    if not fits:
+        raise RigError(
+            f"landmarks: expected {_FEWEST_LANDMARKS} or more pairs, as no limbs were found, "
+            f"found {len(landmarks)}"
+        )
+    best = min(fits, key=lambda fit: misfit(fit.alignment, False))
+    best = replace(best, alignment=replace(best.alignment, how="landmarks"), solids=solids)
+    gap = Phrase("a gap of {after:.2f} % of the size", after=100.0 * misfit(best.alignment, False))
+    return replace(best, lines=(*best.lines, note(wording.GAP, gap=gap)))
+
+
+def _job(
+    template: Figure, pose: Pose, positions: Floats, triangles: Ints, settings: AlignmentSettings
+) -> _Job:
+    exact = Triangles(positions, triangles, settings.samples)
+    cloud = Cloud(exact.samples, sample_surface(positions, triangles, settings.dense))
+    return _Job(template, pose, cloud, exact, settings.scale != "none", settings)
+
+
+def _starts(
+    job: _Job, ours: Posed, theirs: Posed, landmarks: Floats = NO_LANDMARKS
+) -> tuple[list[Start], tuple[Solid, Solid] | None]:
+    """Return the starts from anatomy, and the solids of template and target.
+
+    There is none if template or target has no two pairs of limbs.
+    """
+    with part_of_work(span=(0.0, 0.15)):
         body = template_body(job.template, job.pose, ours.positions)
     if body is None:
-        return []
+        return [], None
     settings = job.settings
     up = axis_direction(settings.up or DEFAULT_UP)
     front = None if settings.facing is None else axis_direction(settings.facing)
     lateral = None if front is None else np.cross(up, front)
-    with part_of_work(span=(0.4, 0.8)):
+    with part_of_work(span=(0.15, 0.3)):
         target = anatomy_of(theirs.positions, theirs.triangles, up, lateral)
-    with part_of_work(span=(0.8, 1.0)):
-        return starts_of(body, target, front)
+    with part_of_work(span=(0.3, 0.4)):
+        return starts_of(body, target, front, landmarks), (body.anatomy.solid, target.solid)
 
 
-def _best(job: _Job, ours: Posed, kept: PosedAlignment, starts: list[Start]) -> PosedAlignment:
+def _best(job: _Job, ours: Posed, kept: PosedAlignment, by_limbs: list[_LimbFit]) -> PosedAlignment:
     """Return the closest of all fits if it removes most of the error."""
-    rigid = kept.alignment
-    fits = _fits_of_limbs(job, starts)
-    # Only a whole figure has all limbs of the template where they should be.
-    whole = [(start, fit) for start, fit in fits if fit.alignment.away <= PART]
-    is_part = rigid.away > PART and not whole
+    rigid, best = kept.alignment, _best_of_limbs(by_limbs)
+    is_part = rigid.away > PART and best is None
     before = misfit(rigid, is_part)
-    best: PosedAlignment | None = None
-    if whole:
-        start, best = min(whole, key=lambda each: _doubtful_misfit(*each))
-        after = misfit(best.alignment, False)
-        lines = [*best.lines, note(wording.GAP, gap=_gap(after, before))]
-        if not start.is_sure:
-            lines.append(note(_ALIKE, remedy=_FACING))
-        best = replace(best, lines=tuple(lines))
-    with part_of_work(span=(0.8, 1.0)):
-        found = _fitted(job, _facing(job, ours, rigid, starts))
+    found = _fitted(job, _facing(job, ours, rigid, by_limbs))
     other = _if_better(kept, found, before, is_part)
     if best is None:
         return other
@@ -175,7 +240,21 @@ def _best(job: _Job, ours: Posed, kept: PosedAlignment, starts: list[Start]) -> 
     return other if misfit(other.alignment, False) < limit else best
 
 
-def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[tuple[Start, PosedAlignment]]:
+def _best_of_limbs(by_limbs: list[_LimbFit]) -> PosedAlignment | None:
+    """Return the closest fit of a whole figure, None without any."""
+    # Only a whole figure has all limbs of the template where they should be.
+    whole = [each for each in by_limbs if each[1].alignment.away <= PART]
+    if not whole:
+        return None
+    start, best = min(whole, key=lambda each: _doubtful_misfit(*each))
+    gap = Phrase("a gap of {after:.2f} % of the size", after=100.0 * misfit(best.alignment, False))
+    lines = [*best.lines, note(wording.GAP, gap=gap)]
+    if not start.is_sure:
+        lines.append(note(_ALIKE, remedy=_FACING))
+    return replace(best, lines=tuple(lines))
+
+
+def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[_LimbFit]:
     """Fit the starts that face the usual way, and the best one also facing the other way."""
     usual = [start for start in starts if start.is_sure or start.is_usual] or starts
     # To make arms of ears, trunk and legs must bend, too.
@@ -183,14 +262,14 @@ def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[tuple[Start, PosedAli
     usual = [start for start in usual if _STRAIGHTER * start.bend <= least]
     found = []
     for number, start in enumerate(usual[:_MOST_STARTS]):
-        with part_of_work(span=(0.45 + 0.12 * number, 0.57 + 0.12 * number)):
+        with part_of_work(span=(0.4 + 0.2 * number, 0.6 + 0.2 * number)):
             found.append((start, _fitted_limbs(job, start)))
     if found:
         best = min(found, key=lambda each: _doubtful_misfit(*each))[0].plan
         same = {id(best.lower), id(best.upper)}
         for start in starts:
             if start not in usual and {id(start.plan.lower), id(start.plan.upper)} == same:
-                with part_of_work(span=(0.69, 0.8)):
+                with part_of_work(span=(0.8, 1.0)):
                     found.append((start, _fitted_limbs(job, start)))
     return found
 
@@ -201,31 +280,52 @@ def _doubtful_misfit(start: Start, fit: PosedAlignment) -> float:
     return gap if start.is_sure or start.is_usual else gap / _CLEARLY
 
 
-def _facing(job: _Job, ours: Posed, rigid: Alignment, starts: list[Start]) -> Alignment:
-    """Return the alignment, reversed if all starts from anatomy face the other way."""
-    if rigid.how not in _FOUND or rigid.away > PART or not starts:
+def _facing(job: _Job, ours: Posed, rigid: Alignment, by_limbs: list[_LimbFit]) -> Alignment:
+    """Return the alignment, reversed if all fits of limbs face the other way."""
+    if rigid.how not in _FOUND or rigid.away > PART or not by_limbs:
         return rigid
     # Columns of the rotations: the template's left and the starts' left in the target.
     left = rigid.similarity.rotation @ left_of(job.template, job.pose)
-    if all(float(left @ start.plan.left) < 0.0 for start in starts):
+    if all(float(left @ start.plan.left) < 0.0 for start, _ in by_limbs):
         return _facing_back(job, ours, rigid, job.template.up)
     return rigid
 
 
 def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:
     """Fit a template to the surface whose limbs are already where the target's are."""
-    marks = replace(start.marks, strength=_MARKED)
-    state = fit_pose(
-        start.marked, start.fitted, job.cloud, job.exact, True, marks, _NEARBY, fades=_FADES
-    )
-    figure = resized(job.template, limbs_of(job.template), *np.exp(state.grown))
-    state = replace(state, figure=figure)
-    found = _result(job, state, "fit")
+    found = _fitted_marks(job, start.marked, start.fitted, start.marks)
+    return replace(found, alignment=replace(found.alignment, has_limbs=True))
+
+
+def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> PosedAlignment:
+    """Fit a template with marks to the surface; ``start`` has them where they should be."""
+    is_landmark = marks.kept == 1.0
+    marks = replace(marks, weights=marks.weights * np.where(is_landmark, 1.0, _MARKED))
+    state = fit_pose(marked, start, job.cloud, job.exact, True, marks, _NEARBY)
+    found = _unmarked(job, state)
     if misfit(found.alignment, False) > _POOR:
         return found
-    # The surface of a similar figure is a better guide to its joints than the anatomy.
-    state = fit_pose(job.template, state, job.exact, job.exact, True, reach=_CLOSER)
-    return _result(job, state, "fit")
+    # The surface of a similar figure is a better guide to its joints than the anatomy, and the
+    # template is a better guide to what the surface does not show, such as the joints of the spine.
+    since = start_of(marked, job.pose, state.similarity)
+    landmarks = Marks(
+        *(rows[is_landmark] for rows in (marks.vertices, marks.targets, marks.weights, marks.kept))
+    )
+    kept = landmarks if is_landmark.any() else None
+    if kept is None:
+        marked, state = job.template, _of_template(job, state)
+    state = fit_pose(marked, state, job.exact, job.exact, True, kept, _CLOSER, since)
+    return _unmarked(job, state)
+
+
+def _unmarked(job: _Job, state: Fitted) -> PosedAlignment:
+    return _result(job, _of_template(job, state), "fit")
+
+
+def _of_template(job: _Job, state: Fitted) -> Fitted:
+    """Return the state of a template without the marks."""
+    figure = resized(job.template, limbs_of(job.template), *np.exp(state.grown))
+    return replace(state, figure=figure)
 
 
 def _if_better(

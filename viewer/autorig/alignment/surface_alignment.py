@@ -18,7 +18,13 @@ from viewer.autorig.alignment.icp import (
     slide,
     trimmed_rms,
 )
-from viewer.autorig.alignment.orientation_search import axis_rotations, in_place, search
+from viewer.autorig.alignment.orientation_search import (
+    axis_rotations,
+    in_place,
+    judge,
+    quick_search,
+    search,
+)
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
@@ -44,6 +50,9 @@ _ROUNDS, _SLIDES = 60, 25  # numbers of iterations of point-to-point and of poin
 _AXES_ROUNDS = 20
 _IN_PLACE = 0.03  # ratio of misfit to size up to which a mesh may already be in place
 _SURELY = 0.003  # ratio of mean distance to size up to which no search is performed
+# The same ratio for two shapes that are nearly the same, after a few iterations with few points:
+# for equal shapes it is 0.002, for realistic people in the same pose 0.005 or more.
+_SIMILAR, _FEWER = 0.004, 4  # and for a fraction of the samples
 _SLIDING = 0.02  # ratio of misfit to size up to which sliding refines the fit
 # Fraction of that misfit that a search must reach to move the mesh: a part of a figure fits nearly
 # as well in many other positions, whereas a whole figure does not.
@@ -87,8 +96,10 @@ class AlignmentSettings:
         choices=SCALES,
     )
     landmarks: Floats | None = None
-    """(N, 2, 3) or None. Three or more pairs of points of the posed template and the target. They
-    replace the search."""
+    """(N, 2, 3) or None. Pairs of points of the posed template and the target, three or more unless
+    they are kept. They replace the search."""
+    keeps_landmarks: bool = True
+    """Whether a fit of pose and proportions keeps the landmarks together, and puts joints there."""
     refines: bool = setting(True, "skip the refinement of the alignment", flag="--no-refine")
     """Whether closest points refine landmarks or the result of the search."""
     matrix: Floats | None = None
@@ -109,8 +120,8 @@ class AlignmentSettings:
         for name, shape in (("landmarks", (None, 2, 3)), ("matrix", (4, 4))):
             if getattr(self, name) is not None:
                 freeze_fields(self, **{name: shape})
-        if self.landmarks is not None and len(self.landmarks) < 3:
-            raise RigError(f"landmarks: expected 3 or more pairs, found {len(self.landmarks)}")
+        if self.landmarks is not None and len(self.landmarks) == 0:
+            raise RigError("landmarks: expected 1 or more pairs, found 0")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,6 +142,8 @@ class Alignment:
     are included."""
     how: AlignedBy
     """``"fit"`` if pose and proportions were also fitted, unless landmarks were given."""
+    has_limbs: bool = False
+    """Whether the fit began at limbs that were found in the target."""
 
     @classmethod
     def of(cls, template: Side, target: Side, similarity: Similarity, how: AlignedBy) -> Alignment:
@@ -152,6 +165,32 @@ def misfit(alignment: Alignment, is_part: bool) -> float:
     """Return the mean of the uneven errors both ways, by which alignments are compared."""
     towards, away = alignment.uneven
     return towards if is_part else 0.5 * (towards + away)
+
+
+def nearly_similar(
+    template: Posed, target: Posed, template_up: str, settings: AlignmentSettings
+) -> bool:
+    """Return whether some similarity brings the target close to the template."""
+    report_fraction(0.0, "comparing the shapes")
+    sides, few = (template, target), max(1, settings.samples // _FEWER)
+    exact = [Triangles(side.positions, side.triangles, few) for side in sides]
+    clouds = [
+        Cloud(
+            sample_surface(side.positions, side.triangles, settings.samples),
+            sample_surface(side.positions, side.triangles, settings.dense),
+        )
+        for side in sides
+    ]
+    scaled = settings.scale != "none"
+    rotations = axis_rotations(template_up, settings.up, settings.facing)
+    stays = in_place(clouds[0], clouds[1], rotations, scaled)
+    # Distances from the surfaces, as those from few points are never small.
+    gaps = gaps_between(exact[0], exact[1], stays.similarity)
+    if float(np.mean(gaps.towards)) <= _SIMILAR * exact[1].size:
+        return True
+    rotations = axis_rotations(template_up, settings.up or DEFAULT_UP, settings.facing)
+    best = quick_search(clouds[0], clouds[1], rotations, None if scaled else 1.0)[0]
+    return judge(exact[0], exact[1], best.similarity).error <= _SIMILAR
 
 
 def align(

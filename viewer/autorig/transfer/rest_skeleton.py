@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -55,12 +56,14 @@ def fit_rest_skeleton(
     joints: Floats,
     transferred: Bools | None,
     original: Skeleton | None = None,
+    pinned: Collection[int] = (),
 ) -> RestSkeleton:
     """Find rest offsets that put a posed skeleton's joints at given positions (J, 3).
 
     ``transferred``: (J,), joints that were measured on the target. A symmetric template then gives
     a symmetric skeleton: left and right offsets are averaged, or taken from the measured side. None
-    keeps the joints unchanged. ``original``: the template's skeleton before its limbs were scaled.
+    keeps the joints unchanged, as are those in ``pinned``. ``original``: the template's skeleton
+    before its limbs were scaled.
     """
     skeleton, skin = template.require_skeleton(), template.require_skin()
     # The target's joint j has the world linear part R P_j, where P_j is the joint's linear part in
@@ -80,6 +83,7 @@ def fit_rest_skeleton(
     offsets[0] = scale * skeleton.rest_translations[0]
     if transferred is not None:
         offsets = _symmetric(template, offsets, scale, transferred)
+        offsets = _with_pins(skeleton.parents, world, offsets + moves, joints, pinned) - moves
     provisional = with_offsets(skeleton, offsets, np.full(len(roots), scale))
     root_scale = leg_scale(original or skeleton, provisional, template.up, scale)
     offsets[roots] += (root_scale - scale) * skeleton.rest_translations[0]
@@ -112,6 +116,20 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     ways = joints[below] - joints[above]
     # A linear system is solved, as the transpose is not the inverse if poses scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
+    return offsets
+
+
+def _with_pins(
+    parents: Ints, world: Floats, offsets: Floats, joints: Floats, pinned: Collection[int]
+) -> Floats:
+    """Return offsets (J, 3) that put some joints where they were, in spite of changes above."""
+    offsets, places = offsets.copy(), joints.copy()
+    for joint, parent in enumerate(parents.tolist() if pinned else ()):
+        if parent < 0:
+            continue
+        if joint in pinned:
+            offsets[joint] = np.linalg.solve(world[parent], joints[joint] - places[parent])
+        places[joint] = places[parent] + world[parent] @ offsets[joint]
     return offsets
 
 

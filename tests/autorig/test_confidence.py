@@ -1,0 +1,153 @@
+"""Confidence in rigs of a bar with three joints, whose findings are known by construction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from autorig.rigged_shapes import arm, mesh_of
+
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.confidence import Body, confidence, doubts, findings, judge, refusal
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import TransferSettings
+from viewer.autorig.solid import solid_of
+from viewer.errors import RigError
+from viewer.rigs.pose import rest_pose
+from viewer.rigs.skin import skin_from_entries
+
+PARENTS = np.array([-1, 0, 1])
+JOINTS = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+
+
+def bar():
+    """Return a closed bar from x = -0.2 to 2.2, 0.4 high and 0.3 wide, with rings every 0.05."""
+    xs, section = (
+        np.linspace(-0.2, 2.2, 49),
+        [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)],
+    )
+    positions = np.array([(x, y, z) for x in xs for y, z in section])
+    index = np.arange(len(positions)).reshape(49, 4)
+    a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
+    c, d = np.roll(index, -1, axis=1)[1:], index[1:]
+    sides = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    (p, q, r, s), (t, u, v, w) = index[0], index[-1]
+    ends = [(p, r, q), (p, s, r), (t, u, v), (t, v, w)]
+    return positions, np.concatenate([sides, ends])[:, ::-1]
+
+
+def body(scale=(1.0, 1, 1), joints=JOINTS, shift=0.0):
+    """Return a bar whose weights blend within 0.2 of the middle joint."""
+    positions, triangles = bar()
+    fraction = np.clip((positions[:, 0] - 0.8) / 0.4, 0.0, 1.0)
+    skin = skin_from_entries(
+        len(positions),
+        np.tile(np.arange(len(positions)), 2),
+        np.repeat([0, 1], len(positions)),
+        np.concatenate([1.0 - fraction, fraction]),
+        np.tile(np.eye(4), (3, 1, 1)),
+    )
+    placed = positions * scale + shift
+    return Body(placed, triangles, skin, joints * scale + shift, solid_of(placed, triangles, 48))
+
+
+def alignment(gap=0.0, how="fit", away=0.0):
+    still = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
+    return Alignment(still, gap, away, (gap, gap), how)
+
+
+def values(target, gap=0.0):
+    found = findings(body(), target, PARENTS, alignment(gap))
+    return {finding.sentence[5:].split(":")[0]: finding for finding in found}
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01, 100.0])
+def test_copy_of_the_template_is_certain_in_any_unit(scale):
+    found = findings(body(), body((scale,) * 3, shift=700.0 * scale), PARENTS, alignment())
+    assert confidence(found) == 1.0 and not [*doubts(found)] and refusal(found) == ""
+    # The same depths, thickness and volume as the template; voxels differ by rounding.
+    for finding in found[2:]:
+        assert finding.value == pytest.approx(1.0, rel=0.02)
+
+
+def test_cut_out_picture_is_too_thin():
+    found = values(body((1.0, 1.0, 0.03)))
+    # Only the least extent has changed; narrow faces count less than before.
+    assert 0.02 < found["thickness"].value < 0.1 and found["thickness"].rating == 0.0
+    assert found["inside"].rating == 1.0
+
+
+def test_bones_outside_the_mesh_are_counted():
+    # The second bone, half of both, is beside the bar except where it leaves it.
+    bent = np.array([[0.0, 0, 0], [1, 0, 0], [1, 2, 0]])
+    found = values(body(joints=bent))
+    # It is inside up to y = 0.2: at the first of the places 0.2, 0.4 ... 1.8.
+    assert found["inside"].value == pytest.approx((9 + 1) / 18, abs=1 / 18)
+    far = values(body(joints=JOINTS + np.array([0, 0, 9.0])))
+    assert far["inside"].value == 0.0 and far["depth"].value == 0.0
+
+
+def test_lengths_are_relative_to_the_median():
+    joints = np.array([[0.0, 0, 0], [0.1, 0, 0], [2, 0, 0]])
+    found = values(body(joints=joints))
+    # Lengths of 0.1 and 1.9 for 1 and 1: their median is 1.
+    assert found["short"].value == pytest.approx(0.1) and found["short"].rating == 0.0
+    assert found["long"].value == pytest.approx(1.9) and found["long"].rating == 1.0
+
+
+def test_test_pose_finds_weights_that_do_not_bend():
+    # A vertex with equal weights of both joints far from the bend collapses; so does the bar.
+    target = body()
+    half = skin_from_entries(
+        len(target.positions),
+        np.tile(np.arange(len(target.positions)), 2),
+        np.repeat([0, 1], len(target.positions)),
+        np.full(2 * len(target.positions), 0.5),
+        np.tile(np.eye(4), (3, 1, 1)),
+    )
+    found = values(replace(target, skin=half))
+    # All vertices move by the mean of R and R R, R a rotation by 40 degrees about the same axis:
+    # in the plane, cos 20 degrees times a rotation, so the volume is multiplied by its square.
+    expected = np.cos(np.radians(20.0)) ** 2
+    template = values(target)["volume"].value
+    assert found["volume"].value == pytest.approx(expected * template, rel=0.05)
+
+
+def test_a_shape_without_limbs_must_agree_more_closely():
+    # A quarter of the way from 0.03 to 0.01, and four fifths of that from 0.045 to 0.02.
+    ratings = [
+        findings(body(), body(), PARENTS, replace(alignment(0.025), has_limbs=has))[0].rating
+        for has in (False, True)
+    ]
+    np.testing.assert_allclose(ratings, [0.25, 0.8])
+
+
+def test_surfaces_far_apart_are_a_doubt_with_its_number():
+    found = findings(body(), body(), PARENTS, alignment(0.06))
+    (line,) = doubts(found)
+    assert line.code == "R017" and line.severity == "warning"
+    assert str(line) == "template and target are 6.0% of the size apart"
+    assert refusal(found).startswith(
+        "the rig is probably wrong: template and target are 6.0% of the size apart: use a template"
+    )
+
+
+@pytest.mark.parametrize("how, away", [("given", 0.0), ("landmarks", 0.0), ("in place", 0.2)])
+def test_what_the_user_has_placed_is_not_judged(how, away):
+    figure = arm()
+    pose = rest_pose(figure.skeleton)
+    found = alignment(0.5, how, away)
+    assert judge(figure, pose, figure, pose, figure.mesh, found) == ()
+
+
+def test_wrong_rig_is_refused_unless_insisted_on():
+    figure = arm()
+    positions, triangles = figure.mesh.positions, figure.mesh.triangles
+    sheet = mesh_of(positions * [1.0, 1.0, 0.02], triangles)
+    pose = rest_pose(figure.skeleton)
+    how = TransferSettings(alignment=AlignmentSettings(samples=100), fits=False)
+    with pytest.raises(RigError, match="times as thick as the template"):
+        transfer(figure, pose, sheet, how)
+    kept = transfer(figure, pose, sheet, replace(how, insists=True))
+    assert confidence(kept.findings) < 0.5
+    assert "R017" in {line.code for line in kept.lines}

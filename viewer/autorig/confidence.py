@@ -1,0 +1,248 @@
+"""Confidence in a rig: whether what was found in the target is what the template has.
+
+The surface of a template can be pressed into any shape, so a small distance between the surfaces
+says little. A rig is right if the limbs of the template are where the target has limbs:
+
+- the surfaces meet, from the target to the template and back;
+- the limbs found in the solid of the target account for its long protrusions;
+- bones are inside the solid, as deep as in the template;
+- the solid is as thick as that of the template: a picture cut out of cardboard is not;
+- limbs have 0.3 to 4 times the length of the template's, and both sides are alike;
+- a test pose that bends all joints keeps the volume.
+
+Each finding is rated from 0, wrong, to 1, as for figures that are rigged well; the least rating is
+the confidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.autorig.alignment.surface_alignment import PART, AlignedBy, Alignment, misfit
+from viewer.autorig.solid import Solid, solid_of
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, note
+from viewer.progress import part_of_work, report_fraction
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.mesh import Mesh, triangle_areas, volume
+from viewer.rigs.pose import Pose
+from viewer.rigs.skin import Skin
+from viewer.rigs.skinning import deform, joint_matrices
+from viewer.rigs.skinning.lbs import move
+
+ENOUGH = 0.5
+"""Confidence below which a rig is probably wrong."""
+
+_FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
+_REMEDY = (
+    "use a template of the same kind, specify --up, --facing or --landmarks, or keep it "
+    "(--keep-doubtful)"
+)
+# Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
+# be apart; where none were found, only a shape that agrees everywhere shows that they are there.
+_FOUND_LIMBS, _NO_LIMBS = (0.045, 0.02), (0.03, 0.01)
+_BEND = np.radians(40.0)  # rotation of every joint in the test pose
+_ALONG = np.linspace(0.1, 0.9, 9)  # places on a bone that are looked at
+_LONG = 0.04  # shortest bone that counts, as a fraction of the template's size
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A posed mesh with the joints of its rig."""
+
+    positions: Floats
+    """(V, 3)."""
+    triangles: Ints
+    """(T, 3)."""
+    skin: Skin
+    joints: Floats
+    """(J, 3). In the frame of the positions."""
+    solid: Solid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finding:
+    """One property of a rig."""
+
+    sentence: str
+    """Key and sentence of the message about it."""
+    value: float
+    """In the unit of ``wrong`` and ``good``."""
+    wrong: float
+    good: float
+    """Values that are rated 0 and 1."""
+
+    @property
+    def rating(self) -> float:
+        """From 0, wrong, to 1, good."""
+        return float(np.clip((self.value - self.wrong) / (self.good - self.wrong), 0.0, 1.0))
+
+
+def confidence(found: tuple[Finding, ...]) -> float:
+    """Return the least rating, 1 for a rig that was not judged."""
+    return min((finding.rating for finding in found), default=1.0)
+
+
+def doubts(found: tuple[Finding, ...]) -> Iterator[Diagnostic]:
+    """Return a message about each finding that says that the rig is wrong, the worst first."""
+    for finding in sorted(found, key=lambda finding: finding.rating):
+        if finding.rating < ENOUGH:
+            yield note(finding.sentence, value=finding.value)
+
+
+def judge(
+    template: Figure,
+    pose: Pose,
+    figure: Figure,
+    figure_pose: Pose,
+    target: Mesh,
+    alignment: Alignment,
+    solids: tuple[Solid, Solid] | None = None,
+) -> tuple[Finding, ...]:
+    """Return what speaks for and against a rig of a target, made from that of a posed template.
+
+    ``figure`` in ``figure_pose`` is the rigged target. Nothing is judged if the user has placed the
+    template, or if a part of a figure, such as clothes, is where the template has it.
+    """
+    if alignment.how not in _FOUND or (alignment.how == "in place" and alignment.away > PART):
+        return ()
+    mesh, skeleton, skin = template.attached()
+    posed = deform(template, pose)[0]
+    report_fraction(0.0, "judging the rig")
+    if solids is None:
+        with part_of_work(span=(0.0, 0.4)):
+            own = solid_of(posed, mesh.triangles)
+        with part_of_work(span=(0.4, 0.8)):
+            solids = own, solid_of(target.positions, target.triangles)
+    joints = joint_matrices(template, pose)[:, :3, 3]
+    rigged = joint_matrices(figure, figure_pose)[:, :3, 3]
+    return findings(
+        Body(posed, mesh.triangles, skin, joints, solids[0]),
+        Body(target.positions, target.triangles, figure.require_skin(), rigged, solids[1]),
+        skeleton.parents,
+        alignment,
+    )
+
+
+def refusal(found: tuple[Finding, ...]) -> str:
+    """Return the reasons not to keep a rig, and what helps; empty if it is probably right."""
+    reasons = "; ".join(str(line) for line in doubts(found))
+    return f"the rig is probably wrong: {reasons}: {_REMEDY}" if reasons else ""
+
+
+def findings(
+    template: Body, target: Body, parents: Ints, alignment: Alignment
+) -> tuple[Finding, ...]:
+    """Return what speaks for and against a rig of a target, made from that of a template."""
+    joints = template.joints
+    size = float(np.ptp(template.positions[template.triangles.ravel()], axis=0).max())
+    ends = np.flatnonzero(parents >= 0)
+    ends = ends[np.linalg.norm(joints[ends] - joints[parents[ends]], axis=1) >= _LONG * size]
+    if len(ends) == 0:
+        ends = np.flatnonzero(parents >= 0)
+    bones = np.stack([parents[ends], ends], axis=1)
+    lengths = _lengths(target, bones) / np.maximum(_lengths(template, bones), 1e-12)
+    scale = float(np.median(lengths))
+    own, other = (_depths(body, bones) for body in (template, target))
+    inside = own > 0.0
+    ratios = other[inside] / (scale * own[inside])
+    return (
+        Finding(
+            "R017.surface: template and target are {value:.1%} of the size apart",
+            misfit(alignment, False),
+            *(_FOUND_LIMBS if alignment.has_limbs else _NO_LIMBS),
+        ),
+        # Without the cap of the misfit, by which hair counts as little as a missing limb.
+        Finding(
+            "R017.covered: the target is {value:.1%} of its size away from the template",
+            alignment.error,
+            wrong=0.12,
+            good=0.06,
+        ),
+        Finding(
+            "R017.inside: only {value:.0%} of the bones are inside the mesh",
+            float((other[inside] > 0.0).mean()),
+            wrong=0.3,
+            good=0.7,
+        ),
+        Finding(
+            "R017.depth: bones are only {value:.2g} times as deep inside as in the template",
+            float(np.median(ratios)),
+            wrong=0.1,
+            good=0.4,
+        ),
+        Finding(
+            "R017.thickness: the mesh is only {value:.2g} times as thick as the template",
+            _thickness(target) / max(_thickness(template), 1e-12),
+            wrong=0.1,
+            good=0.5,
+        ),
+        Finding(
+            "R017.volume: a test pose keeps only {value:.0%} of the volume",
+            _kept(target, parents, bones) / _kept(template, parents, bones),
+            wrong=0.6,
+            good=0.9,
+        ),
+        Finding(
+            "R017.short: a bone has only {value:.2g} times its relative length in the template",
+            float(lengths.min()) / scale,
+            wrong=0.1,
+            good=0.3,
+        ),
+        Finding(
+            "R017.long: a bone has {value:.2g} times its relative length in the template",
+            float(lengths.max()) / scale,
+            wrong=8.0,
+            good=4.0,
+        ),
+    )
+
+
+def _lengths(body: Body, bones: Ints) -> Floats:
+    ends: Floats = np.linalg.norm(body.joints[bones[:, 1]] - body.joints[bones[:, 0]], axis=1)
+    return ends
+
+
+def _depths(body: Body, bones: Ints) -> Floats:
+    """Return the distances from the surface along the bones, 0 outside: (B, A)."""
+    starts, ends = body.joints[bones[:, 0]], body.joints[bones[:, 1]]
+    points = starts[:, None] + _ALONG[:, None] * (ends - starts)[:, None]
+    solid = body.solid
+    depths: Floats = solid.distance[tuple(np.moveaxis(solid.voxel_of(points), -1, 0))]
+    # Points beyond the grid are clamped to its border, which is outside.
+    return depths
+
+
+def _thickness(body: Body) -> float:
+    """Return the least extent of the surface over the middle one: a sheet has nearly 0."""
+    corners = body.positions[body.triangles]
+    centers, areas = corners.mean(axis=1), triangle_areas(body.positions, body.triangles)
+    spreads = np.linalg.eigvalsh(np.cov(centers.T, aweights=areas))
+    return float(np.sqrt(max(spreads[0], 0.0) / max(spreads[1], 1e-300)))
+
+
+def _kept(body: Body, parents: Ints, bones: Ints) -> float:
+    """Return the fraction of the volume that remains if all joints bend, the lower of two poses."""
+    before = volume(body.positions, body.triangles)
+    axis = np.zeros((len(parents), 3))
+    axis[bones[:, 0]] = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
+    axis[bones[:, 1]] = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
+    across = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
+    found = []
+    for axes in (across, np.cross(axis, across)):
+        own = rotation_vector_to_matrix(_BEND * axes)
+        moves = np.tile(np.eye(4), (len(parents), 1, 1))
+        for joint, parent in enumerate(parents.tolist()):
+            # Rotation about the joint, within the parent's: p -> R (p - c) + c.
+            moves[joint, :3, :3] = own[joint]
+            moves[joint, :3, 3] = body.joints[joint] - own[joint] @ body.joints[joint]
+            if parent >= 0:
+                moves[joint] = moves[parent] @ moves[joint]
+        posed = move(body.positions, body.skin, moves)[0]
+        found.append(volume(posed, body.triangles) / before)
+    return min(found)
