@@ -140,38 +140,67 @@ def at_lengths(points: Floats, lengths: Floats) -> Floats:
     return np.stack([np.interp(lengths, known, column) for column in points.T], axis=1)
 
 
+class _Field:
+    """Distances from a voxel of a solid, their level sets, and the paths from its tips."""
+
+    def __init__(self, solid: Solid, paths: Paths, source: int) -> None:
+        from scipy.sparse import csgraph
+
+        self.solid, self.radii = solid, paths.radii
+        self.centers = solid.centers(solid.voxels)
+        self.distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
+        self._levels = LevelSets(paths.steps, self.distances, solid.spacing)
+        self._widths = self._levels.half_widths(self.centers)
+        self._middles = self._levels.middles(self.centers)
+        size = solid.spacing * max(solid.inside.shape)
+        self._least = max(_SHORTEST * size, _VOXELS * solid.spacing)
+        self.tips = self._levels.tips(self._is_limb)
+        routes = paths.to(np.array([source]), self.tips.rows)
+        self.routes = {k: route[::-1] for k, route in enumerate(routes) if self._stands(k, route)}
+        """Paths to the tips of limbs, by the index of the tip."""
+
+    def _is_limb(self, found: Protrusion) -> bool:
+        width = float(self._widths[list(found.base)].max())
+        return found.tip - found.junction >= max(_OWN * width, self._least)
+
+    def _stands(self, tip: int, route: Ints) -> bool:
+        """Return whether a tip is that of a limb, not of a ball, plate or box."""
+        # From the middle of a ball or plate, level sets are as wide as they are far away; halfway
+        # to the tip of a limb that met no other, they are narrower.
+        half = 0.5 * float(self.distances[route[0]])
+        there = route[int(np.abs(self.distances[route] - half).argmin())]
+        return bool(self.tips.stood_out[tip] or self.widths(there) < half)
+
+    def widths(self, rows: Ints) -> Floats:
+        """Return the half widths of the level sets of voxels."""
+        found: Floats = self._widths[self._levels.labels[rows]]
+        return found
+
+    def path(self, rows: Ints, ends: tuple[Floats, Floats | None], width: float) -> Floats:
+        """Return a smooth path between ends along voxels (K,): (K, 3)."""
+        middles = self._middles[self._levels.labels[rows]]
+        points = _centred(self.centers[rows], middles, self.widths(rows))
+        points[0] = ends[0]
+        if ends[1] is not None:
+            points[-1] = ends[1]
+        return _smooth(points, 2 + int(width / self.solid.spacing))
+
+    def parting(self, tips: frozenset[int]) -> float:
+        """Return the distance at which the level sets of some tips part from all others."""
+        others = {*self.routes} - tips
+        met = [at for at, those in self.tips.meetings if those & tips and those & others]
+        return max(met, default=0.0)
+
+
 def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
     """Return the paths from the tips of a solid to one of its voxels, as hubs and chains."""
-    from scipy.sparse import csgraph
-
-    centers = solid.centers(solid.voxels)
-    distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
-    levels = LevelSets(paths.steps, distances, solid.spacing)
-    widths = levels.half_widths(centers)
-    least = max(_SHORTEST * solid.spacing * max(solid.inside.shape), _VOXELS * solid.spacing)
-
-    def stays(found: Protrusion) -> bool:
-        width = float(widths[list(found.base)].max())
-        return found.tip - found.junction >= max(_OWN * width, least)
-
-    tips = levels.tips(stays)
-    routes = paths.to(np.array([source]), tips.rows)
-    # From the middle of a ball or plate, level sets are as wide as they are far away; halfway to
-    # the tip of a limb that met no other, they are narrower.
-    kept = []
-    for number, route in enumerate(routes):
-        half = 0.5 * float(distances[route[0]])
-        there = route[int(np.abs(distances[route] - half).argmin())]
-        if tips.stood_out[number] or widths[levels.labels[there]] < half:
-            kept.append(number)
-    outwards = {number: routes[number][::-1] for number in kept}
-    hub_of, hubs = _hubs(outwards, paths.radii, centers, source)
+    field = _Field(solid, paths, source)
+    hub_of, hubs = _hubs(field.routes, paths.radii, field.centers, source)
     members = [[row for row, hub in hub_of.items() if hub == number] for number in range(len(hubs))]
-    places = np.array([centers[rows].mean(axis=0) for rows in members])
-    places[0] = centers[source]
-    middles = levels.middles(centers)
+    places = np.array([field.centers[rows].mean(axis=0) for rows in members])
+    places[0] = field.centers[source]
     chains: list[Chain] = []
-    for number, route in outwards.items():
+    for number, route in field.routes.items():
         for first, last in _parts(route, hub_of):
             rows = route[first : last + 1]
             start, end = hub_of[int(rows[0])], hub_of.get(int(rows[-1]), -1)
@@ -181,31 +210,38 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
                 continue
             beyond = frozenset(
                 k
-                for k, other in outwards.items()
+                for k, other in field.routes.items()
                 if k == number or (end >= 0 and end in {hub_of.get(int(row)) for row in other})
             )
-            met = [
-                at for at, those in tips.meetings if those & beyond and (those & {*kept}) - beyond
-            ]
-            points = _centred(
-                centers[rows], middles[levels.labels[rows]], widths[levels.labels[rows]]
-            )
-            points[0] = places[start]
-            if end >= 0:
-                points[-1] = places[end]
-            width = max(float(np.median(widths[levels.labels[rows]])), solid.spacing)
-            points = _smooth(points, 2 + int(width / solid.spacing))
-            outside = np.flatnonzero(distances[rows] >= max(met, default=0.0))
-            reached = int(outside[0]) if len(outside) else 0
-            # A chain that is as thick as the hub continues it, as a spine does.
-            thick = float(np.median(paths.radii[rows[reached:]]))
-            if end >= 0 and thick > _NARROWER * paths.radii[hubs[start]]:
-                reached = 0
+            width = max(float(np.median(field.widths(rows))), solid.spacing)
+            ends = places[start], places[end] if end >= 0 else None
+            points = field.path(rows, ends, width)
+            wide = float(paths.radii[hubs[start]])
+            reached = _beginning(field, rows, field.parting(beyond), wide, end >= 0)
             begin = float(arc_lengths(points)[reached])
             chains.append(Chain(start, end, points, width, begin, beyond))
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
-    return Tree(places, paths.radii[rows], rows, ordered, tips.rows[kept])
+    tips = field.tips.rows[[*field.routes]]
+    return Tree(places, paths.radii[rows], rows, ordered, tips)
+
+
+def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner: bool) -> int:
+    """Return the index of the voxel of a path at which it leaves its hub, 0 for the first.
+
+    ``wide``: radius of the hub; ``is_inner``: whether the path ends at another hub.
+    """
+    outside = np.flatnonzero(field.distances[rows] >= parting)
+    reached = int(outside[0]) if len(outside) else 0
+    thick = float(np.median(field.radii[rows[reached:]]))
+    if thick > _NARROWER * wide:
+        # It continues its hub, as a spine does; a limb as thick begins where it parts from others.
+        return 0 if is_inner else reached
+    if parting == 0.0:
+        # The only path of a base or a head: it begins where the radius has changed by half.
+        narrow = np.flatnonzero(field.radii[rows] <= np.sqrt(thick * wide))
+        reached = int(narrow[0])
+    return reached
 
 
 def _hubs(
