@@ -120,11 +120,12 @@ def draw(state: AppState) -> None:
         with disabled(state, why):
             if _section("Shape", "a skeleton is found in the shape of the target"):
                 _draw_shape(state)
-    with disabled(state, why or no_placing(state)):
-        if _section("Align", "align the template with the target"):
-            _draw_alignment(state)
-        if _section("Match", "conditions for using the template's weights unchanged"):
-            _draw_match(state)
+    else:
+        with disabled(state, why or no_placing(state)):
+            if _section("Align", "align the template with the target"):
+                _draw_alignment(state)
+            if _section("Match", "conditions for using the template's weights unchanged"):
+                _draw_match(state)
     with disabled(state, why):
         if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)

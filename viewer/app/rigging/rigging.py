@@ -357,8 +357,6 @@ def compared_methods(method: TransferMethod) -> tuple[TransferMethod, ...]:
 def no_placing(state: AppState) -> str:
     """Return the reason why the template cannot be aligned with the target."""
     template = current_template(state)
-    if state.of(Rigging).template_key == SHAPE:
-        return "a skeleton found in the shape is where it should be"
     if template is None or template.figure.is_attached:
         return ""
     return "a skeleton without a mesh is used where it is, or where it fits inside the target"
