@@ -11,7 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from fault_files import Character, character, islands, matrices, product, quaternion, write_glb
+from fault_files import (
+    Character,
+    character,
+    islands,
+    matrices,
+    product,
+    quaternion,
+    write_bvh,
+    write_glb,
+)
 
 import viewer
 from viewer.linting import Finding, lint_files
@@ -500,6 +509,34 @@ def glb(one: Character, folder: Path) -> list[Path]:
     return [write_glb(one, folder / "one.glb")]
 
 
+def bvh(one: Character, folder: Path) -> list[Path]:
+    return [write_bvh(one, folder / "one.bvh")]
+
+
+def standing(who: Character) -> Character:
+    """The character with its soles at height 0, as captures have them."""
+    one = who.copy()
+    root = np.flatnonzero(one.parents < 0)[0]
+    one.offsets[:, root, one.up] -= one.points[:, one.up].min()
+    return one
+
+
+def bvh_faults(who: Character, r: Roles, rng: np.random.Generator) -> Iterator[Fault]:
+    """Faults of motions that a file without mesh, skin and scales can have."""
+    for fault in motion_faults(who, r, rng):
+        if not set(fault.codes.split()) & {"C023", "C025"}:
+            yield fault
+
+    def changed(name, value):
+        return lambda one: setattr(one, name, value)
+
+    yield Fault("implausible frame time", "C017", [changed("step", 33.3), changed("step", 1e-5)])
+    yield Fault("name twice", "S006 F007", [
+        lambda one: one.names.__setitem__(who[r.elbow], who.names[who[r.knee]])])  # fmt: skip
+    yield Fault("rotation not a number", "F003", [
+        lambda one: one.rotations.__setitem__((5, who[r.elbow]), np.nan)])  # fmt: skip
+
+
 def main(*wanted: str) -> None:
     """Print the tables of all or the given characters."""
     for name, make in characters().items():
@@ -508,6 +545,10 @@ def main(*wanted: str) -> None:
         who, rng = make(), np.random.default_rng(7)
         started = time.process_time()
         table_of(name, who, [*faults_of(who, HUMANS[name], rng)], glb)
+        if HUMANS[name].hinges:
+            who = standing(who)
+            faults = [*bvh_faults(who, HUMANS[name], np.random.default_rng(7))]
+            table_of(f"{name} as BVH", who, faults, bvh)
         print(f"  {time.process_time() - started:.0f} s of processor time\n")
 
 

@@ -263,6 +263,38 @@ def write_glb(one: Character, path: Path, standing: np.ndarray | None = None) ->
     return path
 
 
+def write_bvh(one: Character, path: Path) -> Path:
+    """Write the joints and frames of a character, with six channels for every joint."""
+    lines, order = ["HIERARCHY"], []
+
+    def joint(j: int, depth: int) -> None:
+        pad = "  " * depth
+        order.append(j)
+        lines.append(f"{pad}{'ROOT' if depth == 0 else 'JOINT'} {one.names[j]}")
+        lines.append(f"{pad}{{\n{pad}  OFFSET {' '.join(f'{x:.6f}' for x in one.rest[j])}")
+        names = "Xposition Yposition Zposition Zrotation Yrotation Xrotation"
+        lines.append(f"{pad}  CHANNELS 6 {names}")
+        below = np.flatnonzero(one.parents == j)
+        for child in below:
+            joint(int(child), depth + 1)
+        if len(below) == 0:
+            lines.append(f"{pad}  End Site\n{pad}  {{\n{pad}    OFFSET 0 0.02 0\n{pad}  }}")
+        lines.append(f"{pad}}}")
+
+    joint(int(np.flatnonzero(one.parents < 0)[0]), 0)
+    lines += ["MOTION", f"Frames: {one.n_frames}", f"Frame Time: {one.step:.8f}"]
+    turns = matrices(one.rotations)
+    # R = Rz Ry Rx: its first column is (cos y cos z, cos y sin z, -sin y).
+    y = np.arcsin(np.clip(-turns[..., 2, 0], -1.0, 1.0))
+    z = np.arctan2(turns[..., 1, 0], turns[..., 0, 0])
+    x = np.arctan2(turns[..., 2, 1], turns[..., 2, 2])
+    rows = np.concatenate([one.offsets, np.degrees(np.stack([z, y, x], axis=-1))], axis=-1)
+    for row in rows[:, order].reshape(one.n_frames, -1):
+        lines.append(" ".join(f"{value:.6f}" for value in row))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 def islands(one: Character) -> np.ndarray:
     """Return for each vertex the number of the connected part that it belongs to: (V,)."""
     label = welded(one.points, np.arange(len(one.points), dtype=np.int32)).astype(np.int64)

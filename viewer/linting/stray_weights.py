@@ -115,10 +115,12 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
 
 def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
     """Return which influences are apart from their joint's own part of the surface: (N,)."""
-    # The own part is heavy and near: a large island on a small hand is not the hand.
-    nearest = np.full(len(parts), np.inf)
-    np.minimum.at(nearest, parts, distances)
-    score = np.bincount(parts, found.weights, minlength=len(parts)) / (nearest + _NEAR) ** 2
+    # The own part is heavy and near: a large island on a small hand, one end of which happens to be
+    # near, is not the hand.
+    mass = np.bincount(parts, found.weights, minlength=len(parts))
+    means = np.bincount(parts, found.weights * distances, minlength=len(parts))
+    means = np.divide(means, mass, out=np.full(len(parts), np.inf), where=mass > 0.0)
+    score = mass / (means + _NEAR) ** 2
     most = np.zeros(int(found.joints.max()) + 1)
     np.maximum.at(most, found.joints, score[parts])
     minor: Bools = score[parts] < most[found.joints]
