@@ -28,6 +28,8 @@ from viewer.rigs.geometry.rotation import axis_rotations
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import rest_joints
@@ -360,6 +362,20 @@ def test_figure_on_its_head_is_upside_down():
     )
     (found,) = linted(figure, (bindings, joint_places, spikes))
     assert found.code == "S013" and "the head is 1.3" in found.message
+
+
+@pytest.mark.parametrize(("flip", "expected"), [(1.0, []), (-1.0, ["S013.motion"])])
+def test_skeleton_that_moves_on_its_head_is_upside_down(flip, expected):
+    """The head is 0.7 above two feet, or below them, in all but one of 20 frames."""
+    names = ("hips", "head", "left_foot", "right_foot")
+    offsets = np.array([[0.0, 1, 0], [0, 0.5, 0], [0.1, -0.2, 0], [-0.1, -0.2, 0]])
+    figure = Figure("x", skeleton=make_skeleton(names, [-1, 0, 0, 0], offsets), unit="m")
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (20, 4, 1))
+    turns[1:, 0] = [1.0, 0.0, 0.0, 0.0] if flip < 0.0 else [0.0, 0.0, 0.0, 1.0]
+    clip = SampledClip("x", Timing(30.0, np.arange(20)), turns, np.zeros((20, 4, 3)))
+    found = [*joint_places.check(Subject(Actor(figure, clip=clip)))]
+    assert [one.diagnostic.key for one in found] == expected
+    assert all("0.7 m" in one.message or "700 mm" in one.message for one in found)
 
 
 def test_animal_on_its_back_is_upside_down():

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.linting._finding import Finding
 from viewer.linting._mirror import name_partners
-from viewer.linting._subject import Subject
+from viewer.linting._subject import Subject, track_of
 from viewer.linting._surface import FEWEST, support_of
 from viewer.phrases import agree, counted, listed
 from viewer.rigs.arrays import Floats
@@ -28,6 +28,7 @@ _BLENDS = 0.05  # minimum geometric mean of both weights
 _INSIDE = ("elbow", "wrist", "knee", "ankle")  # joints in the middle of a limb
 _FEET = ("left_ankle", "right_ankle", "left_foot", "right_foot")
 _PAWS = ("foot", "paw", "hoof", "toe", "toes")
+_NEARLY_ALL = 0.9  # fraction of the frames: nobody stands on the hands for longer
 _BELOW = 0.05  # minimum depth of a head below the feet, relative to the size
 
 
@@ -35,6 +36,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     """Check the joints of an attached figure at the bind pose."""
     figure = subject.actor.figure
     size = subject.size()
+    if figure.mesh is None and figure.skeleton is not None and not subject.lacks("joints"):
+        yield from _moves_upside_down(subject, figure)
     if figure.skin is None or figure.mesh is None or not figure.is_attached or not size > 0.0:
         return
     if subject.lacks("weights", "positions", "bindings", "joints"):
@@ -118,18 +121,24 @@ def _outside(
     )
 
 
-def _upside_down(
-    subject: Subject, figure: Figure, places: Floats, meanings: tuple[str, ...], size: float
-) -> Iterator[Finding]:
-    """Report a head below both feet along the up axis."""
-    heights = places[:, "xyz".index(figure.up)]
+def _heads_and_feet(figure: Figure, meanings: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Return the joints of head and feet, of a person or an animal."""
     heads = [meanings.index(name) for name in ("head", "neck") if name in meanings]
     feet = [meanings.index(name) for name in _FEET if name in meanings]
     if not heads or not feet:  # an animal
         words = [word for _, word in sided_words(figure.require_skeleton().names)]
         heads = [joint for joint, word in enumerate(words) if word == "head"]
         feet = [joint for joint, word in enumerate(words) if word.endswith(_PAWS)]
-    if not heads or len(feet) < 2:
+    return (heads, feet) if len(feet) >= 2 else ([], [])
+
+
+def _upside_down(
+    subject: Subject, figure: Figure, places: Floats, meanings: tuple[str, ...], size: float
+) -> Iterator[Finding]:
+    """Report a head below both feet along the up axis."""
+    heights = places[:, "xyz".index(figure.up)]
+    heads, feet = _heads_and_feet(figure, meanings)
+    if not heads:
         return
     depth = float(heights[feet].min() - heights[heads].max())
     if depth > _BELOW * size:
@@ -137,6 +146,29 @@ def _upside_down(
             "S013.head: the head is {depth} below the feet at rest, along {up}",
             depth=subject.length(depth),
             up=figure.up,
+            part="skeleton",
+            joints=[*heads[:1], *feet[:2]],
+            at=("joints", heads[0]),
+        )
+
+
+def _moves_upside_down(subject: Subject, figure: Figure) -> Iterator[Finding]:
+    """Report a skeleton without a mesh whose head is below its feet in nearly all frames."""
+    # Its rest pose may be any, such as all bones along one axis: the motion shows how it stands.
+    track = track_of(subject)
+    heads, feet = _heads_and_feet(figure, joint_meanings(figure.require_skeleton()))
+    if track is None or not heads or not track.present.any() or not track.size > 0.0:
+        return
+    heights = track.positions[track.present][..., "xyz".index(subject.up)]
+    depths = heights[:, feet].min(axis=1) - heights[:, heads].max(axis=1)
+    depth = float(np.quantile(depths, 1.0 - _NEARLY_ALL))
+    if depth > _BELOW * track.size:
+        yield subject.found(
+            "S013.motion: the head is {depth} or more below the feet in {percent} % of the frames, "
+            "along {up}",
+            depth=subject.length(depth / track.scale),
+            percent=round(100.0 * _NEARLY_ALL),
+            up=subject.up,
             part="skeleton",
             joints=[*heads[:1], *feet[:2]],
             at=("joints", heads[0]),
