@@ -164,6 +164,18 @@ def weight_faults(who: Character, r: Roles, rng: np.random.Generator) -> Iterato
     yield Fault("hard weights", "W015", [
         hard([*range(len(who.names))]), hard([j["upper"], j["elbow"]]),
         hard([j["thigh"], j["knee"]])])  # fmt: skip
+
+    def halved(joint, parent):
+        def change(w):
+            rows = w[:, [joint, parent]].sum(axis=1) * (w[:, joint] > 0.02) > 0.5
+            w[rows] = 0.0
+            w[rows, joint] = w[rows, parent] = 0.5
+
+        return lambda one: changed_weights(one, change)
+
+    if r.hinges:
+        yield Fault("half weights in a limb", "W017", [
+            halved(j["elbow"], j["upper"]), halved(j["knee"], j["thigh"])])  # fmt: skip
     copies = np.array([v for v in range(len(who.points)) if len(who.at(v)) > 1 and
                        0.3 < who.weights[v].max() < 0.999 and v != who.at(v)[0]][:400])  # fmt: skip
     if len(copies) >= 6:

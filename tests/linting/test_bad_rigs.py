@@ -21,6 +21,7 @@ from viewer.linting import (
     spikes,
     stray_weights,
     symmetry,
+    volumes,
 )
 from viewer.loading import bundled_body
 from viewer.rigs.figure import Figure
@@ -376,6 +377,33 @@ def test_skeleton_that_moves_on_its_head_is_upside_down(flip, expected):
     found = [*joint_places.check(Subject(Actor(figure, clip=clip)))]
     assert [one.diagnostic.key for one in found] == expected
     assert all("0.7 m" in one.message or "700 mm" in one.message for one in found)
+
+
+def tube(weight: Callable[[np.ndarray], np.ndarray]) -> Figure:
+    """Return a tube of radius 0.1 along x with a wrist at 0; ``weight`` (N,) at x, -1 to 1."""
+    x, angle = np.meshgrid(np.linspace(-1.0, 1.0, 41), np.arange(12) * np.pi / 6, indexing="ij")
+    points = np.stack([x, 0.1 * np.cos(angle), 0.1 * np.sin(angle)], axis=-1).reshape(-1, 3)
+    ring, step = np.divmod(np.arange(40 * 12), 12)
+    a, b = ring * 12 + step, ring * 12 + (step + 1) % 12
+    faces = np.concatenate([np.stack([a, b, a + 12], 1), np.stack([b, b + 12, a + 12], 1)])
+    names = ("left_shoulder", "left_elbow", "left_wrist", "left_hand")
+    places = np.array([[-2.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0], [1.0, 0, 0]])
+    binds = np.tile(np.eye(4), (4, 1, 1))
+    binds[:, :3, 3] = -places
+    weights = weight(points[:, 0])
+    rows = [[(1, 1.0 - w), (2, w)] for w in weights.tolist()]
+    skeleton = make_skeleton(names, [-1, 0, 1, 2], np.diff(places, axis=0, prepend=0.0))
+    return Figure("tube", make_mesh(points, faces), skeleton, skin_from_lists(rows, binds))
+
+
+def test_twist_loses_half_of_what_moves_with_equal_weights():
+    """An even change loses a third, 2 w (1 - w) in the mean over w; equal weights lose half."""
+    even = tube(lambda x: np.clip(0.5 + 0.5 * x, 0.0, 1.0))
+    assert linted(even, (volumes,)) == []
+    equal = tube(lambda x: np.where(np.abs(x) < 0.9, 0.5, np.where(x < 0.0, 0.0, 1.0)))
+    (found,) = linted(equal, (volumes,))
+    assert found.code == "W017" and found.joints.tolist() == [2]
+    assert "left_wrist 50 %" in found.message
 
 
 def test_animal_on_its_back_is_upside_down():

@@ -90,6 +90,11 @@ CODES: dict[str, Code] = {
     "W014": Code("warning", "torn seams", "copy the weights of one side of the seam to the other"),
     "W015": Code("warning", "hard weights", "smooth the weights between these joints"),
     "W016": Code("warning", "noisy weights", "smooth the weights of these vertices"),
+    "W017": Code(
+        "warning",
+        "volume lost in a twist",
+        "let the weights change evenly along the limb, or add twist joints",
+    ),
     # Bind matrices
     "B001": Code(
         "error", "bindings do not match the skeleton", "export skin and skeleton together"

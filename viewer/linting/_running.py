@@ -38,6 +38,7 @@ CHECKS = {
     "stray_weights": Check("stray weights"),
     "blending": Check("blending of weights"),
     "noise": Check("noise of weights"),
+    "volumes": Check("volumes of twisted limbs"),
     "bindings": Check("bind matrices"),
     "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
     "joint_places": Check("places of joints"),

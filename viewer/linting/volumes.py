@@ -1,0 +1,95 @@
+"""Check of weights for volume that a joint loses in a test pose: candy wrappers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewer.diagnostics import Phrase
+from viewer.linting._finding import Finding
+from viewer.linting._subject import Indices, Subject
+from viewer.linting._surface import FEWEST
+from viewer.phrases import counted, listed
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.hierarchy import descendants
+from viewer.rigs.mesh import area_vectors
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.skin import Skin, bind_positions, merged, normalized, owners
+
+_LIMBS = ("elbow", "wrist", "knee", "ankle")
+_ANGLE = np.radians(90.0)  # about the bone that ends at the joint: a forearm twists by as much
+# Twisted by t, the cross-section with a weight w of the joint shrinks to the square of
+# |1 - w + w e^it|: it loses 2 w (1 - w) (1 - cos t). At 90 degrees, weights that change evenly lose
+# a third of the volume in which they blend, and equal weights half; 152 limbs of artists lose 32 %
+# in the median and 47 % at most.
+_LOST = 0.48
+_BLENDS = 0.02  # smallest weight, and distance from 1, of a vertex that blends
+_FEWEST = 24  # minimum number of triangles
+
+
+def check(subject: Subject) -> Iterator[Finding]:
+    """Twist elbows, wrists, knees and ankles by 90 degrees, and compare volumes."""
+    figure = subject.actor.figure
+    if figure.skin is None or figure.mesh is None or not figure.is_attached:
+        return
+    if figure.mesh.n_vertices < FEWEST or figure.mesh.n_triangles == 0:
+        return
+    if subject.lacks("weights", "positions", "triangles", "bindings", "joints"):
+        return
+    skeleton, whole = figure.require_skeleton(), normalized(merged(figure.skin))
+    places = bind_positions(figure.skin)
+    lost: list[tuple[float, int]] = []
+    blending: list[Indices] = []
+    for joint, meaning in enumerate(joint_meanings(skeleton)):
+        parent = int(skeleton.parents[joint])
+        if parent >= 0 and meaning.endswith(_LIMBS):
+            axis = places[joint] - places[parent]
+            fraction, vertices = _twisted(figure, whole, joint, places[joint], axis)
+            if fraction > _LOST:
+                lost.append((fraction, joint))
+                blending.append(vertices)
+    if not lost:
+        return
+    labels, order = joint_labels(skeleton), np.argsort([-each for each, _ in lost])
+    names = [
+        Phrase("{joint} {percent} %", joint=labels[lost[k][1]], percent=round(100.0 * lost[k][0]))
+        for k in order
+    ]
+    yield subject.found(
+        "W017.twist: twisted by 90°, {n} much of the volume around {them}: {names}; weights that "
+        "change evenly lose 33 %",
+        n=counted(len(lost), "joint", "loses", "lose"),
+        them="it" if len(lost) == 1 else "them",
+        names=listed(names),
+        vertices=np.concatenate([blending[k] for k in order]),
+        joints=[lost[k][1] for k in order],
+        at=("bindings", lost[int(order[0])][1]),
+    )
+
+
+def _twisted(
+    figure: Figure, skin: Skin, joint: int, centre: Floats, axis: Floats
+) -> tuple[float, Indices]:
+    """Return the fraction of the volume that is lost where a joint blends, and the vertices."""
+    mesh, below = figure.require_mesh(), descendants(figure.require_skeleton().parents, joint)
+    moved = below[skin.joints]
+    weights = np.bincount(owners(skin)[moved], skin.weights[moved], minlength=mesh.n_vertices)
+    blends = (weights > _BLENDS) & (weights < 1.0 - _BLENDS)
+    triangles = mesh.triangles[blends[mesh.triangles].all(axis=1)]
+    vertices = np.flatnonzero(blends)
+    if len(triangles) < _FEWEST or not axis.any():
+        return 0.0, vertices
+    # A strip of surface at the distance r from the axis bounds a volume of area r / 2.
+    corners = mesh.positions[triangles] - centre
+    along = unit(axis)
+    middles = corners.mean(axis=1)
+    away = np.linalg.norm(middles - np.outer(middles @ along, along), axis=1)
+    volumes = away * np.linalg.norm(area_vectors(mesh.positions, triangles), axis=1)
+    parts = weights[triangles].mean(axis=1)
+    lost = 2.0 * parts * (1.0 - parts) * (1.0 - np.cos(_ANGLE))
+    total = float(volumes.sum())
+    return (float((lost * volumes).sum()) / total if total > 0.0 else 0.0), vertices
