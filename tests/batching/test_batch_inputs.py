@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from viewer.batching.inputs import Inputs, find_inputs, natural_key
+from viewer.batching.inputs import Inputs, find_inputs
 from viewer.batching.items import Item
 from viewer.batching.naming import check_outputs, items_of, template_of
 from viewer.errors import ViewerError
+from viewer.media.file_names import natural_key
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ NAMES = [
     "feet",
     "transfer",
     "binding",
+    "decomposition",
     "video",
     "quality",
 ]

@@ -306,8 +306,9 @@ def test_existing_files_are_not_replaced_without_force(folder, tmp_path, capsys)
 def test_two_target_meshes_are_refused(folder, tmp_path, capsys):
     other = tmp_path / "other.obj"
     other.write_bytes((folder / "scan.obj").read_bytes())
-    assert run(["rig", str(folder / "scan.obj"), str(other)]) == 2
-    assert capsys.readouterr().err == "viewer: expected one mesh to rig, found 2\n"
+    assert run(["rig", str(folder / "scan.obj"), str(other), "--from", "fox"]) == 2
+    expected = "viewer: --from: expected one mesh without a motion, found several meshes\n"
+    assert capsys.readouterr().err == expected
 
 
 # Landmark files

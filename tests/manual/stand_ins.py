@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from app.tiny import SKEL, skin_text
+from autorig import moving_shapes
 from formats.anny.anny_package import files, wheel
 from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import body, write_frames
@@ -247,6 +248,9 @@ def _motions(folder: Path) -> None:
     _made("convert", "--body", "-o", "scan.obj")
     shutil.copy("cat.ply", "spider.ply")
     _made("convert", "spider.ply", "-o", "spider.obj")
+    (folder / "frames").mkdir()
+    moving_shapes.write_frames(folder / "frames", "box", *moving_shapes.two_boxes())
+    _made("rig", "frames", "-o", "face.glb")
     _made("rig", "scan.obj", "--from", "body", "-o", "scan.npz", "--method", "nearest")
 
 

@@ -152,7 +152,8 @@ def cheaper(words: list[str]) -> list[str]:
         more += ["--trim", "98:102"]
     if "--turntable" in words:
         more += ["--fps", "2"]
-    if job == "rig" and "--skeleton" not in words:
+    moves = "--bones" in words or any("frames" in word for word in words)
+    if job == "rig" and "--skeleton" not in words and not moves:
         more += ["--method", "nearest"]
     if job == "render":
         size = "200x200" if "--panels" in words else "160x90"

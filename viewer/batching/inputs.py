@@ -13,13 +13,13 @@ from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, all_suffixes
 from viewer.formats._published_models import published_names
+from viewer.media.file_names import natural_key
 from viewer.phrases import counted, listed, printable
 
 _AMBIGUOUS = (".txt", ".json")  # usually notes and settings, not poses
 _WILD = re.compile(r"[*?[]")
 # Files next to the motions of AMASS, in its first and second release.
 _SHAPE_FILES = re.compile(r"shape\.npz|.*_stagei\.npz")
-_DIGITS = re.compile(r"[0-9]+")
 
 
 @dataclass(frozen=True)
@@ -69,21 +69,6 @@ def find_inputs(
     if not search.roots:
         raise ViewerError("expected files, folders or patterns, found none")
     return search.result()
-
-
-def natural_key(path: str) -> tuple[str, str]:
-    """Return a sort key that orders paths part by part, with numbers by value.
-
-    >>> sorted(["a/walk10", "a/walk9", "a-b/walk1"], key=natural_key)
-    ['a/walk9', 'a/walk10', 'a-b/walk1']
-    """
-    # A longer number is larger, and a folder is compared as a whole before its contents.
-    return _DIGITS.sub(_with_length, path.casefold()).replace("/", "\0"), path
-
-
-def _with_length(number: re.Match[str]) -> str:
-    digits = number[0].lstrip("0")
-    return f"{len(digits):03}{digits}"
 
 
 def is_recording(folder: str | Path) -> bool:

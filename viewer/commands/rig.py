@@ -1,4 +1,4 @@
-"""Rig transfer from a figure to an unrigged mesh.
+"""Rig transfer from a figure to an unrigged mesh, and rigs from the motion of a mesh.
 
 ``--landmarks`` names a text file with pairs of corresponding points, one pair per line: three
 numbers of the posed template and three of the target, or the name of a joint of the template and
@@ -24,6 +24,7 @@ import numpy as np
 from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings, stated_up
 from viewer.autorig.correspondence import MatchSettings
+from viewer.autorig.decomposition import DecompositionSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.autorig.settings import BINDING, SkeletonSettings, TransferSettings
@@ -36,36 +37,49 @@ from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.commands.convert import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.diagnostics.record import note_found
-from viewer.errors import FormatError, RigError, ViewerError
+from viewer.errors import FormatError, RigError, UnsupportedFormatError, ViewerError
 from viewer.exporters import (
+    EXPORTERS,
     ExportOptions,
     Selection,
     VrmMeta,
     check_figure,
     export,
     exporter_for,
+    files_written,
     sampled,
 )
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
+from viewer.loading.mesh_sequence import SEQUENCES, read_mesh_sequence
 from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
-from viewer.phrases import printable, rounded
+from viewer.phrases import counted, printable, rounded
 from viewer.progress import part_of_work
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.clip import Clip, is_course_rig
+from viewer.rigs.motion.moving_mesh import (
+    FrameErrors,
+    MovingMesh,
+    frame_errors,
+    moving_mesh,
+    posed_rows,
+)
 from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.pose import Pose
+from viewer.rigs.scalars import length_text
 from viewer.rigs.scene import Actor, Scene, scene_of
 from viewer.rigs.skinning import joint_matrices, posed_mesh
-from viewer.streams import require_stdout, summary_stream
+from viewer.rigs.units import UNIT_NAMES
+from viewer.streams import is_stdout, require_stdout, summary_stream
 
+_MOST_LINES = 100  # frames whose errors are printed
 # Landmarks.
 _FARTHEST = 1e9  # largest coordinate, in any unit
 _LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
@@ -78,7 +92,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="+",
         metavar="TARGET",
-        help=f"the mesh: {', '.join(MESHES)}; and its texture image",
+        help=f"the mesh: {', '.join(MESHES)}; and its texture image; or the frames of a mesh that "
+        f"moves, several {' or '.join(SEQUENCES)} files or a folder of them",
     )
     parser.add_argument(
         "--from",
@@ -131,6 +146,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(group, WeightSettings)
     add_settings(group, TransferSettings, "joints", "fits", "correctives", "insists")
     add_settings(group, SkeletonSettings)
+    group = parser.add_argument_group("rig from motion")
+    add_settings(group, DecompositionSettings)
+    group.add_argument(
+        "--bind-frame",
+        type=int,
+        metavar="N",
+        help="the frame in which the mesh is bound (default: the first)",
+    )
+    add_settings(group, MotionSettings, "animation")
     group = parser.add_argument_group("alignment")
     add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
     add_settings(group, AlignmentSettings, "scale")
@@ -163,6 +187,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, print a report, write it, and show it if requested."""
     from viewer.exporters._rigged_files import files_of, write_rigged
 
+    frames_of_mesh = _sequence(arguments.files)
+    if arguments.bones is not None or len(frames_of_mesh) > 1:
+        return _rig_moving(arguments, frames_of_mesh)
     output = None if arguments.output is None else Path(arguments.output)
     meta = settings_of(VrmMeta, arguments)
     check_meta(meta, output)
@@ -249,7 +276,8 @@ def rig(
     given = {"from": template, "skeleton": skeleton}
     words = {name: paths_of("rig", what) for name, what in given.items() if what is not None}
     own = "output", "force", "clip", "view", "from", "skeleton"
-    without = (*own, "vrm_name", "vrm_author", "vrm_licence")
+    of_motion = "bones", "tolerance", "bind_frame", "animation"
+    without = (*own, *of_motion, "vrm_name", "vrm_author", "vrm_licence")
     arguments = arguments_of("rig", add_arguments, options, without, ["a"])
     arguments.template, arguments.skeleton = words.get("from", []), words.get("skeleton", [])
     inputs: list[Path] = []
@@ -318,6 +346,159 @@ def _transferred(
             target.name,
         )
     return replace(rigged, lines=(*found, *rigged.lines))
+
+
+def _sequence(files: Sequence[str]) -> list[Path]:
+    """Return the frames of a mesh if all arguments are such files, or one folder of them."""
+    paths = [Path(file) for file in files]
+    if len(paths) == 1 and paths[0].is_dir():
+        paths = [path for path in paths[0].iterdir() if path.suffix.lower() in SEQUENCES]
+    return paths if all(path.suffix.lower() in SEQUENCES for path in paths) else []
+
+
+def _rig_moving(arguments: argparse.Namespace, sequence: list[Path]) -> int:
+    """Find the bones of a mesh that moves, write them, and print the errors of all frames."""
+    from viewer.autorig.bones_from_motion import read_back_errors, rig_motion
+
+    _check_only_motion(arguments)
+    output = None if arguments.output is None else Path(arguments.output)
+    inputs = sequence or [Path(resolve(file)) for file in arguments.files]
+    if output is not None:
+        require_stdout(output)
+        if not {"clips", "frames"} <= EXPORTERS[exporter_for(output)].stores:
+            suffixes = " or ".join(EXPORTERS["gltf"].suffixes)
+            raise UnsupportedFormatError(
+                f"{printable(output, 300)}: expected {suffixes} for a mesh with bones and their "
+                f"motion, found {output.suffix.lower()}"
+            )
+        check_targets(files_written(output), inputs, arguments.force)
+    most = settings_of(WeightSettings, arguments).max_influences
+    how = settings_of(DecompositionSettings, arguments)
+    how = how if most is None else replace(how, max_influences=most)
+    frames = frames_of(arguments)
+    with shown_progress("finding bones"):
+        if len(sequence) > 1:
+            moving, notes = read_mesh_sequence(sequence, frames.fps, arguments.bind_frame)
+            print_warnings(notes)
+        else:
+            moving = _moving_figure(arguments, frames)
+        made = rig_motion(moving, how)
+        scene, written = Scene([made.actor], world_up=made.actor.figure.up), list[Diagnostic]()
+        if output is not None:
+            options = ExportOptions(kind="gltf")
+            part = sampled(options.kind, options, scene, made.actor)
+            written = export(Selection([part], scene), output, options=options)
+        if output is not None and not is_stdout(output):
+            (again,) = load(output).actors
+            errors, missing = read_back_errors(moving, made.times, again)
+        else:
+            errors = frame_errors(moving, posed_rows(made.actor.figure, made.clip, made.times))
+            missing = np.zeros(0, dtype=np.int32)
+    stream = sys.stdout if output is None else summary_stream(output)
+    for each in (*made.lines, *written, *error_lines(moving, errors, missing, how)):
+        note_found(each)
+        print(each, file=stream)
+    if arguments.view:
+        from viewer.app.window import show
+
+        show(scene)
+    return 0
+
+
+def _check_only_motion(arguments: argparse.Namespace) -> None:
+    """Check that there is no option for a template or a skeleton."""
+    given = {
+        "--from": arguments.template,
+        "--skeleton": arguments.skeleton,
+        "--auto": arguments.auto,
+        "--clip": arguments.clips,
+        "--landmarks": arguments.landmarks,
+        "--method": arguments.method,
+        "--smooth": arguments.smooth,
+        "--up": arguments.up,
+        "--facing": arguments.facing,
+        "--frame": arguments.frame is not None,
+        "--time": arguments.time is not None,
+        "--template-pose": arguments.pose,
+        "--template-frame": arguments.template_frame is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            found = "--bones" if arguments.bones is not None else "several meshes"
+            raise ViewerError(f"{option}: expected one mesh without a motion, found {found}")
+
+
+def _moving_figure(arguments: argparse.Namespace, frames: Frames) -> MovingMesh:
+    """Return the vertices of the figure that moves in a scene."""
+    motion = settings_of(MotionSettings, arguments, frame_rate=frames.fps)
+    scene = load(*map(resolve, arguments.files), motion=motion)
+    print_warnings(scene.diagnostics)
+    meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
+    moving = [actor for actor in meshes if actor.joint_motion is not None]
+    if len(moving) != 1:
+        raise ViewerError(
+            f"--bones: expected one mesh that moves, found {len(moving)} among "
+            f"{counted(len(meshes), 'mesh')}; its motion is an animation of its file, another "
+            "file, or a mesh file for each frame"
+        )
+    return moving_mesh(moving[0], frames.fps, arguments.bind_frame)
+
+
+def error_lines(
+    moving: MovingMesh, errors: FrameErrors, missing: Ints, how: DecompositionSettings
+) -> list[Diagnostic]:
+    """Return the error of each frame, or of the worst of very many, and of all together."""
+    figure, size, numbers = moving.figure, moving.size, moving.numbers.tolist()
+    worst = errors.worst
+
+    def values(row: int) -> dict[str, object]:
+        rms, largest = float(errors.rms[row]), float(errors.largest[row])
+        return {
+            "frame": numbers[row],
+            "rms": _length(figure, rms),
+            "rms_percent": rounded(100.0 * rms / size),
+            "largest": _length(figure, largest),
+            "largest_percent": rounded(100.0 * largest / size),
+            "vertex": int(errors.vertices[row]),
+        }
+
+    rows = np.arange(moving.n_frames)
+    if len(rows) > _MOST_LINES:
+        rows = np.sort(np.argsort(-errors.rms, kind="stable")[:_MOST_LINES])
+    key = (
+        "X002.frame-error: frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
+        "({largest_percent} %) at vertex {vertex}"
+    )
+    lines = [note(key, **values(row)) for row in rows.tolist()]
+    if len(rows) < moving.n_frames:
+        n = counted(moving.n_frames - len(rows), "frame", "is", "are")
+        lines.append(note("X002.other-frames: {n} closer than these", n=n))
+    total = {
+        "total": _length(figure, errors.total),
+        "total_percent": rounded(100.0 * errors.total / size),
+    }
+    key = (
+        "X002.sequence-error: error of the skinned mesh: RMS {total} ({total_percent} % of the "
+        "size); worst frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
+        "({largest_percent} %)"
+    )
+    lines.append(note(key, **values(worst), **total))
+    over = 100.0 * float(errors.rms[worst]) / size
+    if not how.bones and over > how.tolerance:
+        key = (
+            "X002.over-tolerance: more than the tolerance of {tolerance:g} %: --bones N finds more "
+            "bones, --max-influences N uses more for each vertex"
+        )
+        lines.append(note(key, tolerance=how.tolerance))
+    if len(missing):
+        n = counted(len(missing), "vertex", "is", "are")
+        lines.append(note("X003.loose-vertices: {n} without a face and not in the file", n=n))
+    return lines
+
+
+def _length(figure: Figure, length: float) -> str:
+    """Return a length in the figure's unit; a plain number if that is unknown."""
+    return length_text(figure, length) if figure.unit in UNIT_NAMES else rounded(length)
 
 
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:

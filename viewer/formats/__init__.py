@@ -18,7 +18,7 @@ from viewer.phrases import Remedy, listed, printable
 if TYPE_CHECKING:
     from viewer.formats._references import read_picture, referenced_path
     from viewer.formats.rig import NamedFiles
-    from viewer.media.file_names import file_stem, folder_name, opened_text
+    from viewer.media.file_names import file_stem, folder_name, natural_key, opened_text
     from viewer.media.image import is_picture, save_image
     from viewer.media.named_arrays import save_arrays
     from viewer.media.output_checks import check_folder_target, check_targets
@@ -70,6 +70,7 @@ __all__ = [
     "free_path",
     "is_picture",
     "keeping_written",
+    "natural_key",
     "opened_text",
     "read",
     "read_picture",
@@ -214,7 +215,7 @@ FORMATS = {
 
 _REEXPORTED = {
     "viewer.formats._references": ("read_picture", "referenced_path"),
-    "viewer.media.file_names": ("file_stem", "folder_name", "opened_text"),
+    "viewer.media.file_names": ("file_stem", "folder_name", "natural_key", "opened_text"),
     "viewer.media.image": ("is_picture", "save_image"),
     "viewer.media.named_arrays": ("save_arrays",),
     "viewer.media.saving": (

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
+_DIGITS = re.compile(r"[0-9]+")
 _LONGEST = 100  # maximum length of a stem in characters
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
 """Names of folders that exist in every EasyMocap recording or copy of the PIG model."""
@@ -45,3 +47,18 @@ def file_stem(name: str, otherwise: str = "picture") -> str:
     """
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
     return safe[:_LONGEST] or otherwise
+
+
+def natural_key(path: str) -> tuple[str, str]:
+    """Return a sort key that orders paths part by part, with numbers by value.
+
+    >>> sorted(["a/walk10", "a/walk9", "a-b/walk1"], key=natural_key)
+    ['a/walk9', 'a/walk10', 'a-b/walk1']
+    """
+    # A longer number is larger, and a folder is compared as a whole before its contents.
+    return _DIGITS.sub(_with_length, path.casefold()).replace("/", "\0"), path
+
+
+def _with_length(number: re.Match[str]) -> str:
+    digits = number[0].lstrip("0")
+    return f"{len(digits):03}{digits}"

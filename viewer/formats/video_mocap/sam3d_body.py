@@ -32,6 +32,7 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, first_rows, intrinsics_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track
+from viewer.media.file_names import natural_key
 from viewer.phrases import listed
 from viewer.rigs.arrays import Floats
 from viewer.rigs.captures.points import PointLayout
@@ -442,7 +443,7 @@ def _frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
     >>> _frames_and_people(["f10.npz", "f9.npz"])
     {'f9.npz': (0, 0), 'f10.npz': (1, 0)}
     """
-    ordered = sorted(names, key=_natural)
+    ordered = sorted(names, key=natural_key)
     for pattern in (_PERSON, _TWO):
         matches = {name: pattern.fullmatch(name.rpartition(".")[0]) for name in ordered}
         parts = {name: (match[1], int(match[2])) for name, match in matches.items() if match}
@@ -453,10 +454,3 @@ def _frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
         if len(set(parts.values())) == len(names) and is_used:
             return {name: (stems.index(stem), person) for name, (stem, person) in parts.items()}
     return {name: (frame, 0) for frame, name in enumerate(ordered)}
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Return a sort key that orders numbers in names by their values."""
-    return [
-        (int(part[:9]), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)
-    ]
