@@ -460,6 +460,8 @@ def _symmetry(state: AppState, figure: Figure) -> Plane | None:
 
 def delete_joint(state: AppState) -> None:
     """Remove the selected joint of the edited skeleton; its children and weights go up."""
+    if edited(state) is None:
+        return  # the key also deletes keys of curves
 
     def edit(actor: Actor) -> None:
         figure, joint = actor.figure, state.selected_joint
