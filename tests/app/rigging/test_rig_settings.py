@@ -146,7 +146,7 @@ def test_mesh_is_added_by_dialog_and_the_body_is_loaded_on_demand(drive, tmp_pat
     assert hand.state.actor.name == "scan" and hand.state.of(Rigging).target is hand.state.actor
     assert hand.state.paths[-1] == tmp_path / "scan.obj"
     assert hand.undo_steps == 1
-    assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
+    assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox", "From shape"]
     hand.pick("Template", 2)
     assert hand.state.of(Rigging).template_key == "fox"
     hand.click("rig tool move")  # the template must be loaded to be moved
