@@ -219,7 +219,7 @@ def test_divider_needs_two_figures_and_pages(tmp_path, capsys):
 
 
 @needs_chromium
-def test_poster_is_shown_until_the_view_has_started(browser, tmp_path):
+def test_poster_is_shown_until_the_view_has_started(browser, tmp_path, poster):
     """The page's script never starts: its picture, with a text, is all that is seen."""
     still(tmp_path / "a.html", bent(9, "name"))
     text = (tmp_path / "a.html").read_text("utf-8")
@@ -227,4 +227,4 @@ def test_poster_is_shown_until_the_view_has_started(browser, tmp_path):
     browser.send("Page.navigate", url=(tmp_path / "b.html").as_uri())
     browser.run("new Promise(done => setTimeout(done, 300))")
     alt = "[document.querySelector('#poster').alt, document.querySelector('#poster').naturalWidth]"
-    assert browser.run(alt) == ["name: 3D view", 800]
+    assert browser.run(alt) == ["name: 3D view", poster[0]]
