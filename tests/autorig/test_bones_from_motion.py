@@ -45,6 +45,20 @@ def test_joint_is_where_both_bones_move_alike():
     np.testing.assert_allclose(joint, [0.0, 0.0, 1.5], atol=1e-3)
 
 
+def test_joint_of_bones_that_hardly_turn_is_where_they_meet():
+    # Turns of half a degree about an axis 20 sizes away are nearly a shift.
+    rest, _, quads, weights = tube()
+    positions = [rest]
+    for frame in range(1, 8):
+        turn = rotation((0.0, 0.01 * np.sin(frame), 0.0))
+        moved = (rest - (60.0, 0.0, 1.5)) @ turn.T + (60.0, 0.0, 1.5)
+        positions.append((1.0 - weights)[:, None] * rest + weights[:, None] * moved)
+    rig = rig_motion(moving_mesh(np.array(positions), quads), DecompositionSettings(bones=2))
+    joint = rig.actor.figure.skeleton.rest_translations.sum(axis=0)
+    # Blended vertices are between the heights 1 and 2.
+    assert np.linalg.norm(joint[:2]) < 1.0 and 0.9 < joint[2] < 2.1
+
+
 def test_limbs_are_children_of_the_part_that_they_share_vertices_with():
     # A bar whose thirds are joined by blended rings: the middle one is the root.
     rest, _, quads, _ = tube(n_rings=19)
