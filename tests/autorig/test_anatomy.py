@@ -143,6 +143,8 @@ def test_quadruped_has_two_standing_pairs_in_both_orders():
     for plan, z in ((front, 0.55), (back, -0.55)):
         assert plan.upper.attachment[2] == pytest.approx(z, abs=0.06)
         assert plan.lower.attachment[2] == pytest.approx(-z, abs=0.06)
+    # A person would have a trunk that rises from the legs.
+    assert plans_of(anatomy, is_quadruped=False) == []
 
 
 def test_ball_has_no_plan():

@@ -58,6 +58,7 @@ _ARM = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)  # fractions of the path from
 _LEG = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # fractions of the height of the attachment
 _AS_LONG = 0.5  # length of arms relative to the longest limbs above the legs
 _MOST_ARMS = 2  # pairs that may be arms: ears of a rabbit are as long
+_LEANING = np.tan(np.radians(65.0))  # of a trunk that is upright: people bend, animals have 80
 _TAIL = 0.12  # shortest tail, as a fraction of the size
 _HEAD = (0.3, 0.95)  # part of the path from chest to top that contains the widest place of a head
 # Part of a leg's height to which a sole reaches, at which the shin is, and longest foot.
@@ -329,7 +330,7 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
                 found.append(Plan(hind, fore, left))
         return found
     legs = min(standing or anatomy.pairs, key=lambda pair: heights[id(pair)])
-    above = [pair for pair in anatomy.pairs if heights[id(pair)] > heights[id(legs)]]
+    above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair)]
     longest = max((pair.length for pair in above), default=0.0)
     # Ears, horns and capes are shorter than arms, or are attached above them.
     arms = [pair for pair in above if pair.length >= _AS_LONG * longest]
@@ -338,6 +339,13 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
             if front is None or float(np.cross(left, anatomy.up) @ front) > 0.0:
                 found.append(Plan(legs, pair, left))
     return found
+
+
+def _rises(anatomy: Anatomy, legs: LimbPair, pair: LimbPair) -> bool:
+    """Return whether a trunk from the legs to a pair above them is upright, not an animal's."""
+    trunk = pair.attachment - legs.attachment
+    up = float(trunk @ anatomy.up)
+    return up > 0.0 and float(np.linalg.norm(trunk - up * anatomy.up)) <= _LEANING * up
 
 
 def feet_ahead(anatomy: Anatomy, plan: Plan, is_quadruped: bool) -> float:
