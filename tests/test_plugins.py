@@ -57,6 +57,8 @@ def written(install, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "viewer-off"
     project = tomllib.loads((folder / "pyproject.toml").read_text())
     assert project["project"]["name"] == "viewer-off"
+    own = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    assert own["project"]["name"] in project["project"]["dependencies"]
     points = [
         (group.removeprefix("viewer."), key, value)
         for group, rows in project["project"]["entry-points"].items()
