@@ -178,6 +178,45 @@ def test_command_of_a_plugin_runs(install, tmp_path, monkeypatch, capsys):
     assert run(["--no-plugins", "count-joints", "body"]) == 2
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def run(a): return 1 / 0", "failed: ZeroDivisionError: division by zero"),
+        ("def run(a): open('no/file')", "failed: FileNotFoundError: "),
+        ("raise SystemExit(7)", "cannot be imported: SystemExit: 7"),
+        ("run = 1\ndef add_arguments(p): p.nothing()", "failed: AttributeError: "),
+    ],
+    ids=["exception", "file", "script", "arguments"],
+)
+def test_error_of_a_command_is_one_line_with_its_package(text, message, install, capsys):
+    place = install("tools", [("commands", "fail2", "tool_two")])
+    (place / "tool_two.py").write_text(f"def add_arguments(p): pass\n{text}\n")
+    assert run(["fail2"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"viewer: plug-in tools 0.1 (commands fail2): {message}")
+
+
+def test_commands_may_exit(install):
+    place = install("tools", [("commands", "leave", "tool_four")])
+    (place / "tool_four.py").write_text(
+        "def add_arguments(p): pass\ndef run(a): raise SystemExit(7)"
+    )
+    with pytest.raises(SystemExit, match="7"):
+        run(["leave"])
+
+
+def test_help_of_a_command_shows_its_usage(install, capsys):
+    place = install("tools", [("commands", "tidy", "tool_three")])
+    (place / "tool_three.py").write_text(
+        "def add_arguments(p): p.add_argument('file'); p.add_argument('--100%')\ndef run(a): pass"
+    )
+    with pytest.raises(SystemExit):
+        run(["tidy", "--help"])
+    assert "usage: viewer tidy [-h] [--100% 100%] file" in capsys.readouterr().out
+    assert run(["tidyy"]) == 2
+    assert "did you mean tidy?" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["Off", "a b", "-x", "viewer", "a--b", "1a"])
 def test_names_of_new_plugins_are_checked(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

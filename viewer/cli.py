@@ -12,7 +12,13 @@ from collections.abc import Sequence
 
 import viewer
 from viewer.commands import COMMANDS
-from viewer.commands._usage import Parser, command_module, command_parser, is_plugged_command
+from viewer.commands._usage import (
+    Parser,
+    command_module,
+    command_parser,
+    guard_of,
+    is_plugged_command,
+)
 from viewer.errors import FormatError, ViewerError
 from viewer.interrupts import Interrupted, deferred, watched
 from viewer.phrases import printable
@@ -106,7 +112,8 @@ def _dispatch(arguments: list[str]) -> int:
 
         with without_cache():
             return command.run(parsed)
-    return command.run(parsed)
+    with guard_of(name):
+        return command.run(parsed)
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

@@ -58,13 +58,15 @@ class Plugin:
             return attrgetter(name)(found) if name else found
 
     @contextmanager
-    def guarded(self, what: str) -> Iterator[None]:
+    def guarded(self, what: str, may_exit: bool = False) -> Iterator[None]:
         """Turn exceptions of the plug-in into errors of one line; ``what`` failed."""
         try:
             yield
-        except ViewerError:
+        except (ViewerError, BrokenPipeError):
             raise
-        except Exception as problem:
+        except (Exception, SystemExit) as problem:
+            if may_exit and isinstance(problem, SystemExit):
+                raise
             reason = printable(f"{type(problem).__name__}: {problem}", 300)
             raise self.error(f"{what}: {reason}") from problem
 

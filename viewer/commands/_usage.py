@@ -7,19 +7,21 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
 from viewer.errors import ViewerError
 from viewer.phrases import printable
-from viewer.plugins import plugin_of
+from viewer.plugins import plugin_of, plugins_of
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 _NUMBER = re.compile(r"-\.?\d")  # start of a value or file name, not of an option
-_WORD = re.compile(r"[^\W\d_]+")  # a possible command; most files have a suffix or a folder
+_NAME = re.compile(r"[^\W_][\w-]*")  # a possible command; most files have a suffix or a folder
+_WORD = re.compile(r"[^\W\d_]+")  # one that may be misspelt
 _LONGEST = 60  # maximum length of a name in a message, characters
 
 
@@ -91,7 +93,11 @@ def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
         return own
     text = COMMANDS.get(name, "a command of a plug-in")
     parser = Parser(prog=f"viewer {name}", description=text)
-    module.add_arguments(parser)
+    with guard_of(name):
+        module.add_arguments(parser)
+        if parser.usage is None:  # argparse would show that of errors, which is empty
+            usage = argparse.ArgumentParser.format_usage(parser).removeprefix("usage: ")
+            parser.usage = usage.strip().replace("%", "%%")
     return parser
 
 
@@ -107,16 +113,23 @@ def command_module(name: str) -> Any:
     return module
 
 
+def guard_of(name: str) -> AbstractContextManager[None]:
+    """Return a context in which exceptions of a plug-in's command are errors of one line."""
+    plugin = None if name in COMMANDS else plugin_of("commands", name)
+    return nullcontext() if plugin is None else plugin.guarded("failed", may_exit=True)
+
+
 def is_plugged_command(word: str) -> bool:
     """Return whether a first argument is a plug-in's command; raise if it is a misspelt one."""
     from viewer.models import resolve
     from viewer.near_names import did_you_mean
 
-    if not _WORD.fullmatch(word.replace("-", "")) or os.path.lexists(resolve(word)):
+    if not _NAME.fullmatch(word) or os.path.lexists(resolve(word)):
         return False
     if plugin_of("commands", word) is not None:
         return True
-    near = did_you_mean(word, COMMANDS)
+    known = [*COMMANDS, *(found.name for found in plugins_of("commands"))]
+    near = did_you_mean(word, known) if _WORD.fullmatch(word.replace("-", "")) else ""
     if near:
         raise ViewerError(
             f'no command and no file is called "{printable(word, _LONGEST)}"; {near} '
