@@ -20,7 +20,6 @@ from viewer.app.playback.animations import choose_animation
 from viewer.app.posing.posing import ask_for_export, ask_for_pose, pose_of_file
 from viewer.app.retargeting.drive_changes import shown_drive
 from viewer.app.retargeting.joint_match_panel import ask_where_to_save
-from viewer.app.rigging.joint_editing import is_unsaved
 from viewer.app.rigging.results import ask_where_to_save_rig, shown_result
 from viewer.app.rigging.rigging import Rigging
 from viewer.data_classes import dataclass
@@ -303,12 +302,12 @@ def _rigs(state: AppState) -> list[_Unsaved]:
             _for_actor(row, partial(ask_for_export, suffix=".glb")),
         )
         for row, actor in enumerate(state.scene.actors)
-        if is_unsaved(state, actor) and actor.figure not in saved
+        if actor.figure in saved.edited and actor.figure not in saved
     ]
     if state.of(Rigging).scene is not state.scene:
         return found
     result = shown_result(state)
-    is_edited = result is not None and is_unsaved(state, result.actor)
+    is_edited = result is not None and result.actor.figure in saved.edited
     if result is None or result in saved or is_edited:
         return found
     text = f"{printable(result.target.name, _LONGEST)}: rig"

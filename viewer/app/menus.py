@@ -17,6 +17,7 @@ from viewer.app.core.reasons import (
     no_undo,
     nothing_to_export,
 )
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
@@ -46,7 +47,6 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
-from viewer.app.rigging.joint_editing import is_unsaved
 from viewer.app.view.display_panel import draw_view_menu
 from viewer.formats import opened_text
 from viewer.phrases import printable
@@ -116,7 +116,7 @@ def _draw_items(state: AppState, *actions: Action) -> None:
 
 def _ask_for_export(state: AppState) -> None:
     """Ask where to export the chosen actor, by default with a new rig if it has one."""
-    ask_for_export(state, ".glb" if is_unsaved(state, state.actor) else ".obj")
+    ask_for_export(state, ".glb" if state.actor.figure in state.of(SavedWork).edited else ".obj")
 
 
 _BUNDLED = (

@@ -13,6 +13,7 @@ from linting.sound import FRAMES, RATE, column, keypoints, scene_of, standing
 from linting.test_rechecks import TEXTS
 from rigs.animated import animated_leg, bow, channel, clip_of
 
+from viewer.app.closing import unsaved_edits
 from viewer.app.layout import ShownPanels
 from viewer.app.linting.lint_panel import Linting, check_rig, start_check
 from viewer.app.linting.marks import marks_of
@@ -267,8 +268,10 @@ def test_fix_is_one_step_of_undo_and_is_checked_again(lint):
     assert "W001" not in codes(hand)
     skin = hand.state.scene.actors[0].figure.skin
     assert skin.weights[skin.starts[5]] == 1.0
+    assert [edit.text for edit in unsaved_edits(hand.state)] == ["column: rig"]
     hand.key("z", "ctrl")
     hand.step(2)
+    assert not unsaved_edits(hand.state)
     assert hand.state.scene.actors[0].figure is LIGHT
     assert not hand.state.history.can_undo
 

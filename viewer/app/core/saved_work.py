@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import field, replace
 from functools import partial
+from weakref import WeakSet
 
 from viewer.data_classes import dataclass
 from viewer.rigs.figure import Figure
@@ -28,6 +29,8 @@ class SavedWork:
     # Edits replace an object by a new one, and undo restores the old one, so an object that is not
     # recorded contains unsaved edits. Poses are edited in place, so they are recorded by value.
     _objects: list[object] = field(default_factory=list)
+    edited: WeakSet[Figure] = field(default_factory=WeakSet)
+    """Figures whose rig or mesh was edited, saved or not; others have those of their files."""
 
     def add(self, *objects: object) -> None:
         """Record objects whose content is saved."""

@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from viewer.app.core.clock import PosedFor
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.scene_version import ActorVersion, SceneVersion
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import WARNING, ink, text_color
@@ -437,6 +438,8 @@ def _start_fixing(state: AppState) -> None:
             return  # other files were opened meanwhile
         for actor, fixed, (figure, clip) in zip(source.actors, copy.actors, before, strict=True):
             if actor.figure is figure and actor.clip is clip:
+                if fixed.figure is not figure:
+                    state.of(SavedWork).edited.add(fixed.figure)
                 actor.figure, actor.clip = fixed.figure, fixed.clip
         state.say(*notes)
         state.say_status(f"Fixed: {counted(len(notes), 'change')}")

@@ -16,6 +16,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import text_field
 from viewer.app.core.view_frame import Place, ViewFrame, view_frame
@@ -146,10 +147,8 @@ class JointEditing:
     """Chosen entry of the list of starts."""
     choices: EditChoices = field(default_factory=EditChoices)
     drag: JointDrag | None = None
-    made: WeakSet[Figure] = field(default_factory=WeakSet)
-    """Figures made by edits."""
     stale: WeakSet[Figure] = field(default_factory=WeakSet)
-    """Those whose weights do not fit their joints yet."""
+    """Figures made by edits whose weights do not fit their joints yet."""
     binding: Figure | None = None
     """The one that is being bound."""
     refused: Figure | None = None
@@ -203,11 +202,6 @@ def no_joint(state: AppState) -> str:
     if edited(state) is None:
         return "turn on Edit skeleton in the Rig panel first"
     return "" if state.selected_joint >= 0 else "select a joint"
-
-
-def is_unsaved(state: AppState, actor: Actor) -> bool:
-    """Return whether an actor has a rig made by edits."""
-    return actor.figure in state.of(JointEditing).made
 
 
 # What the mesh alone determines
@@ -378,7 +372,7 @@ def _enter(
         state.say(_NOT_KEPT.format(listed(lost, 8)))
     actor.clip, actor.animation, actor.drive, actor.springs = None, -1, None, None
     if figure is not actor.figure:
-        editing.made.add(figure)
+        state.of(SavedWork).edited.add(figure)
     if place is not None:
         actor.placement, actor.pose = place, None
     _show(actor, figure)
@@ -426,7 +420,7 @@ def _commit(state: AppState, figure: Figure, text: str, selected: int | None = N
     if lost:
         state.say(_NOT_KEPT.format(listed(lost, 8)))
     _show(actor, figure)
-    editing.made.add(figure)
+    state.of(SavedWork).edited.add(figure)
     if editing.choices.weights != "keep":
         editing.stale.add(figure)
     if selected is not None:
@@ -746,7 +740,7 @@ def _put_weights(
         new = replace(new, blend_shapes=None)
         state.say("Not kept: blend shapes, as the mesh at rest differs from the bind pose")
     _keep_rest_mesh(new, mesh)
-    editing.made.add(new)
+    state.of(SavedWork).edited.add(new)
     editing.problem = ""
     state.observe()
     state.history.exchange_figure(figure, new)
@@ -860,7 +854,8 @@ def _draw_weights(state: AppState, actor: Actor) -> None:
     if figure is editing.refused and editing.problem:
         warning(f"{editing.problem[0].upper()}{editing.problem[1:]}")
     if figure not in editing.stale or editing.choices.weights == "keep":
-        imgui.text_disabled("weights: up to date" if figure in editing.made else "weights: as read")
+        is_edited = figure in state.of(SavedWork).edited
+        imgui.text_disabled("weights: up to date" if is_edited else "weights: as read")
         return
     imgui.text_disabled("weights: out of date")
     if figure is editing.refused:
