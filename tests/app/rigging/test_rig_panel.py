@@ -17,6 +17,7 @@ import viewer
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
 from viewer.app.rigging import work
+from viewer.app.rigging.joint_editing import JointEditing
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
@@ -270,6 +271,24 @@ def test_a_key_toggles_between_mesh_and_rig_without_undo_steps(rigging):
     hand.key("z", "ctrl")
     hand.step(2)
     assert visible(hand) == ["scan", "arm"] and names(hand) == ["scan", "arm"]
+
+
+def test_a_key_says_that_an_edited_rig_is_no_version(rigging, texts):
+    hand = rigging()
+    hand.click("Run")
+    hand.finish_job()
+    hand.state.of(JointEditing).start = "own"
+    hand.click("Edit skeleton")
+    hand.finish_job()
+    hand.key("delete")
+    hand.step(2)
+    hand.finish_job()
+    assert hand.state.actor.figure.skeleton.n_joints == 1
+    hand.key("a")
+    texts.clear()
+    hand.step()
+    assert "A/B: the rig was edited: File > Export saves it" in texts
+    assert "The rig was edited: File > Export saves it." in texts
 
 
 def test_second_run_replaces_the_first_result(rigging):

@@ -17,7 +17,6 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     explain,
-    key_name,
     note_item,
     radio,
     same_line_if_room,
@@ -168,7 +167,8 @@ def switch_version(state: AppState) -> None:
     """Show the next version, the target or one of its results, in place of the current one."""
     known = list(_versions(state))
     if len(known) < 2:
-        state.say_status("A/B: nothing is rigged yet, see Window > Rig")
+        why = no_results(state) if state.of(Rigging).results else ""
+        state.say_status(f"A/B: {why or 'nothing is rigged yet, see Window > Rig'}")
         return
     shown = _shown_version(state)
     following = known[(known.index(shown) + 1) % len(known)] if shown else known[0]
@@ -318,11 +318,7 @@ def draw_results(state: AppState) -> None:
     """Draw the choice of version and colours, the statistics of each method, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
-        redone = f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it."
-        is_edited = not all(is_intact(one) for one in state.of(Rigging).results.values())
-        imgui.text_wrapped(
-            "Its joints were edited: File > Export saves it." if is_edited else redone
-        )
+        imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
         return
     _draw_question(state, result)
     shown = _shown_version(state)

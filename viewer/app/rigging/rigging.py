@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.app.core.widgets import key_name
 from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings, TemplateScale
@@ -388,7 +389,7 @@ def no_target(state: AppState) -> str:
 
 
 def is_intact(result: Result) -> bool:
-    """Return whether an actor still shows a result: its joints may have been edited since."""
+    """Return whether an actor still shows a result: its rig may have been edited since."""
     return result.actor.figure is result.rigged.figure
 
 
@@ -398,4 +399,8 @@ def no_results(state: AppState) -> str:
     results = state.of(Rigging).results.values()
     if any(id(result.actor) in there and is_intact(result) for result in results):
         return ""
+    if not all(map(is_intact, results)):
+        return "the rig was edited: File > Export saves it"
+    if results:
+        return f"the rig was undone: {key_name(state, 'Ctrl+Shift+Z')} restores it"
     return "nothing is rigged yet: press Run"
