@@ -1,8 +1,11 @@
 """Export of 1,000 frames of the bundled body, and the cost of comparing the written file."""
 
+import sys
 import tempfile
 from pathlib import Path
 from unittest.mock import patch
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from exporting import export_frames

@@ -28,6 +28,7 @@ NAMES = [
     "feet",
     "transfer",
     "binding",
+    "rigging",
     "decomposition",
     "video",
     "quality",
@@ -36,5 +37,7 @@ NAMES = [
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "formats")]
 
-for name in sys.argv[1:] or NAMES:
+chosen = sys.argv[1:] or NAMES
+sys.argv[1:] = []  # the benchmarks have arguments of their own
+for name in chosen:
     import_module(f"bench_{name}").main()
