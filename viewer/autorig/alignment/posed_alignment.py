@@ -308,10 +308,7 @@ def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> Pos
     # The surface of a similar figure is a better guide to its joints than the anatomy, and the
     # template is a better guide to what the surface does not show, such as the joints of the spine.
     since = start_of(marked, job.pose, state.similarity)
-    landmarks = Marks(
-        *(rows[is_landmark] for rows in (marks.vertices, marks.targets, marks.weights, marks.kept))
-    )
-    kept = landmarks if is_landmark.any() else None
+    kept = marks.chosen(is_landmark)
     if kept is None:
         marked, state = job.template, _of_template(job, state)
     state = fit_pose(marked, state, job.exact, job.exact, True, kept, _CLOSER, since)
