@@ -1,11 +1,14 @@
 """Anatomy of figures made of capsules, whose joints are known by construction."""
 
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from viewer.autorig.anatomy import anatomy_of, body_points, feet_ahead, plans_of
+from viewer.autorig.anatomy import LimbPair, anatomy_of, body_points, feet_ahead, plans_of
+from viewer.autorig.solid import solid_of
 from viewer.errors import RigError
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -63,6 +66,12 @@ def person(head=0.12, ears=False):
     return mesh(*parts)
 
 
+@pytest.fixture(scope="module")
+def standing():
+    """Return the anatomy of a person whose sides are known."""
+    return anatomy_of(*person(), UP, np.array([1.0, 0, 0]))
+
+
 @pytest.mark.parametrize("head", [0.12, 0.35])
 def test_limbs_and_head_of_a_person_are_found_whatever_the_size_of_the_head(head):
     anatomy = anatomy_of(*person(head), UP)
@@ -106,17 +115,27 @@ def test_staff_in_one_hand_is_not_part_of_the_arm():
         np.testing.assert_allclose(points[row], [side * 0.72, 1.0, 0.0], atol=0.08)
 
 
-def test_feet_point_to_the_front():
-    anatomy = anatomy_of(*person(), UP)
-    for plan in plans_of(anatomy, is_quadruped=False):
+def test_longer_path_of_an_arm_that_touches_the_body_is_not_cut(standing):
+    (plan,) = plans_of(standing, False, AHEAD)
+    one, other = plan.upper.limbs
+    # The path enters the plane elsewhere; the tip is as far from the plane as before.
+    way = one.attachment - np.linspace(0.02, 0.3, 15)[:, None] * UP
+    points, radii = np.concatenate([one.points, way]), np.append(one.radii, np.full(15, 0.1))
+    touching = LimbPair((replace(one, points=points, radii=radii), other))
+    points = body_points(standing, replace(plan, upper=touching), is_quadruped=False).positions
+    # The first points are at 5 % of the path, 0.75 to 1.05 long, from the tip at x = 0.75.
+    assert sorted(points[[16, 24], 0]) == pytest.approx([-0.71, 0.71], abs=0.03)
+
+
+def test_feet_point_to_the_front(standing):
+    for plan in plans_of(standing, is_quadruped=False):
         ahead = float(np.cross(plan.left, UP) @ AHEAD)
         # Soles reach from z = -0.05 to 0.18, shins are at 0: 0.13 of a height of 1.36.
-        assert feet_ahead(anatomy, plan, False) == pytest.approx(ahead * 0.13 / 1.36, abs=0.03)
+        assert feet_ahead(standing, plan, False) == pytest.approx(ahead * 0.13 / 1.36, abs=0.03)
 
 
-def test_known_front_leaves_one_facing():
-    anatomy = anatomy_of(*person(), UP, np.array([1.0, 0, 0]))
-    (plan,) = plans_of(anatomy, False, AHEAD)
+def test_known_front_leaves_one_facing(standing):
+    (plan,) = plans_of(standing, False, AHEAD)
     np.testing.assert_allclose(plan.left, [1.0, 0, 0])
 
 
@@ -147,7 +166,8 @@ def test_quadruped_has_two_standing_pairs_in_both_orders():
     assert plans_of(anatomy, is_quadruped=False) == []
 
 
-def test_ball_has_no_plan():
+def test_ball_has_no_plan(monkeypatch):
+    monkeypatch.setattr("viewer.autorig.anatomy.solid_within", partial(solid_of, resolution=32))
     anatomy = anatomy_of(*mesh([(0, 0, 0, 1.0)]), UP)
     assert plans_of(anatomy, False) == [] and plans_of(anatomy, True) == []
 

@@ -423,10 +423,15 @@ def _arc_lengths(points: Floats) -> Floats:
 def _arm_points(anatomy: Anatomy, limbs: list[Limb]) -> list[Floats]:
     """Return points from the tips of two arms to their junctions with the trunk: (N, 5) each."""
     arcs = [_arc_lengths(limb.points) for limb in limbs]
-    # Both arms are equally long: what one of them is longer, it holds in its hand. Weapons and
-    # shields also have narrow and wide places, so the junction nearer to the plane is that of both.
-    longest = min(float(arc[-1]) for arc in arcs)
-    starts = [int(np.searchsorted(arc, arc[-1] - longest)) for arc in arcs]
+    # Both arms are equally long: what one of them is longer, it holds in its hand. If only its path
+    # is longer, one of the arms touches the body. Weapons and shields also have narrow and wide
+    # places, so the junction nearer to the plane is that of both.
+    least, shortest = min(limb.length for limb in limbs), min(float(arc[-1]) for arc in arcs)
+    held = [
+        min(limb.length - least, float(arc[-1]) - shortest)
+        for limb, arc in zip(limbs, arcs, strict=True)
+    ]
+    starts = [int(np.searchsorted(arc, length)) for arc, length in zip(arcs, held, strict=True)]
     junctions = [
         arc[-1] - arc[row]
         for limb, arc, start in zip(limbs, arcs, starts, strict=True)
