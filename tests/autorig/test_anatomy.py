@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from viewer.autorig.anatomy import LimbPair, anatomy_of, body_points, feet_ahead, plans_of
+from viewer.autorig.anatomy import Limb, LimbPair, anatomy_of, body_points, feet_ahead, plans_of
 from viewer.autorig.solid import solid_of
 from viewer.errors import RigError
 
@@ -64,6 +64,12 @@ def person(head=0.12, ears=False):
     if ears:
         parts += both((0.5 * head, 1.12 + 1.7 * head, 0, 0.04), (0.3, 1.9 + head, 0, 0.04))
     return mesh(*parts)
+
+
+def ear(side):
+    """Return a limb 0.4 long, from the plane at a height of 1."""
+    points = np.array([[0.4 * side, 1.2, 0.8], [0.0, 1.0, 0.8]])
+    return Limb(points, np.full(2, 0.04), points[1], 0.4)
 
 
 @pytest.fixture(scope="module")
@@ -164,6 +170,13 @@ def test_quadruped_has_two_standing_pairs_in_both_orders():
         assert plan.lower.attachment[2] == pytest.approx(-z, abs=0.06)
     # A person would have a trunk that rises from the legs.
     assert plans_of(anatomy, is_quadruped=False) == []
+    # Ears above the forelegs are no arms, as a person would not stand on the hind legs, too.
+    lower = front.upper
+    limbs = tuple(replace(limb, attachment=limb.attachment - 0.1 * UP) for limb in lower.limbs)
+    ears = LimbPair((ear(1.0), ear(-1.0)))
+    pairs = (front.lower, LimbPair(limbs), ears)
+    assert plans_of(replace(anatomy, pairs=pairs), is_quadruped=False) == []
+    assert len(plans_of(replace(anatomy, pairs=pairs[1:]), is_quadruped=False)) == 2
 
 
 def test_ball_has_no_plan(monkeypatch):

@@ -334,6 +334,9 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
     longest = max((pair.length for pair in above), default=0.0)
     # Ears, horns and capes are shorter than arms, or are attached above them.
     arms = [pair for pair in above if pair.length >= _AS_LONG * longest]
+    # What else stands on the ground is a leg, so this is an animal whose ears are no arms.
+    others = {id(pair) for pair in standing if pair.length >= _AS_LONG * legs.length} - {id(legs)}
+    arms = [pair for pair in arms if others <= {id(pair)}]
     for pair in sorted(arms, key=lambda pair: heights[id(pair)])[:_MOST_ARMS]:
         for left in (anatomy.lateral, -anatomy.lateral):
             if front is None or float(np.cross(left, anatomy.up) @ front) > 0.0:
