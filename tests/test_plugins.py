@@ -90,6 +90,15 @@ def test_modules_are_imported_when_their_rows_are_used(written, capsys):
     assert "viewer_off.scalars" in sys.modules and len(np.unique(image.reshape(-1, 4), axis=0)) > 9
 
 
+@pytest.mark.parametrize("name", ["PTS", ".pts"])
+def test_suffixes_may_have_a_dot_and_capitals(name, install, tmp_path):
+    text = "import viewer\ndef read(source): return viewer.figure([[0, 0, 0]] * 3, [[0, 1, 2]])\n"
+    (install("points", [("formats", name, "points_one")]) / "points_one.py").write_text(text)
+    for file in ("a.pts", "b.PTS"):
+        (tmp_path / file).write_text("x\n")
+        assert viewer.load(tmp_path / file)[0].figure.mesh.n_vertices == 3
+
+
 def test_quantities_follow_the_pose(written):
     body = viewer.load("body")[0]
     body["left_shoulder"] = [0.0, 0.0, 1.2]  # the arm goes up

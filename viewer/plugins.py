@@ -107,10 +107,10 @@ def _installed(group: Group) -> tuple[Plugin, ...]:
 
     found: dict[str, Plugin] = {}
     for each in sorted(entry_points(group=f"viewer.{group}"), key=lambda each: each.name):
+        # A suffix is also written as ".off" or "OFF".
+        name = each.name.lower().removeprefix(".") if group == "formats" else each.name
         package = "of an unknown package"
         if each.dist is not None:
             package = f"{each.dist.metadata['Name']} {each.dist.version}"
-        found.setdefault(
-            each.name, Plugin(group, each.name, each.value.strip(), printable(package, 100))
-        )
+        found.setdefault(name, Plugin(group, name, each.value.strip(), printable(package, 100)))
     return tuple(found.values())
