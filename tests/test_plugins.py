@@ -163,14 +163,21 @@ def test_error_of_a_plugin_is_one_line_with_its_package(text, message, install, 
         ("ONE = 1", "expected a Scalar, found int"),
         ("from viewer.rigs.scalars import Scalar\nONE = Scalar(lambda f, v: v, 'One')",
          r"expected finite values of shape \(7813,\), found shape \(7813, 3\)"),
+        ("from viewer.rigs.scalars import Scalar\n"
+         "ONE = Scalar(lambda f, v: [*[0] * 5, *[float('nan')] * 7808], 'One')",
+         r"expected finite values of shape \(7813,\), found nan at vertex 5"),
     ],
-    ids=["type", "shape"],
+    ids=["type", "shape", "nan"],
 )  # fmt: skip
 def test_wrong_quantities_are_refused(text, message, install):
     (install("bad", [("scalars", "one", "bad_two:ONE")]) / "bad_two.py").write_text(text)
     figure = viewer.load("body")[0].figure
     with pytest.raises(PluginError, match=rf"plug-in bad 0\.1 \(scalars one\): {message}"):
         scalars.compute("one", figure, None, viewer.Skinning())
+    with pytest.raises(viewer.ViewerError, match=r"did you mean one\?"):
+        _installed.cache_clear()
+        scalars.SCALARS.pop("one", None)
+        scalars.split_name("onne")
 
 
 def test_command_of_a_plugin_runs(install, tmp_path, monkeypatch, capsys):

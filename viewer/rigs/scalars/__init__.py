@@ -176,10 +176,12 @@ def _plugged_values(
         posed, _ = deform(figure, pose, skinning)
     with plugin.guarded("cannot be computed"):
         values: Floats = np.array(quantity.compute(figure, posed), dtype=np.float64)
-    if values.shape != (len(posed),) or not np.isfinite(values).all():
-        raise plugin.error(
-            f"expected finite values of shape ({len(posed)},), found shape {values.shape}"
-        )
+    wanted = f"expected finite values of shape ({len(posed)},)"
+    if values.shape != (len(posed),):
+        raise plugin.error(f"{wanted}, found shape {values.shape}")
+    if not np.isfinite(values).all():
+        vertex = int((~np.isfinite(values)).argmax())
+        raise plugin.error(f"{wanted}, found {values[vertex]} at vertex {vertex}")
     return values
 
 
@@ -188,7 +190,8 @@ def split_name(name: str) -> tuple[str, str]:
     key, colon, about = name.partition(":")
     _find_plugin(key)
     if key not in SCALARS:
-        raise RigError(f'no scalar quantity "{key}"; {name_hint(key, SCALARS)}')
+        known = [*SCALARS, *(found.name for found in unused_plugins())]
+        raise RigError(f'no scalar quantity "{key}"; {name_hint(key, known)}')
     if colon and not SCALARS[key].about:
         raise RigError(f'scalar quantity "{key}": expected no joint, found "{about}"')
     return key, about
