@@ -233,7 +233,9 @@ def test_help_of_a_command_shows_its_usage(install, capsys):
     assert "did you mean tidy?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["Off", "a b", "-x", "viewer", "a--b", "1a"])
+@pytest.mark.parametrize(
+    "name", ["Off", "a b", "-x", "viewer", "a--b", "1a", "class", "json", "numpy"]
+)
 def test_names_of_new_plugins_are_checked(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["new-plugin", "--", name]) == 2

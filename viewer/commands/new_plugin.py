@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
+from importlib.util import find_spec
+from keyword import iskeyword
 from pathlib import Path
 from string import Template
 
@@ -43,6 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     if name == "viewer":
         raise ViewerError("expected a name other than that of this program")
     folder, module = Path(arguments.output or name), name.replace("-", "_")
+    if iskeyword(module) or find_spec(module) is not None:
+        raise ViewerError(f"expected a name that Python does not know yet, found {module}")
     if folder.exists():
         raise ViewerError(f"{printable(folder, 300)}: exists; expected a new folder")
     for file, source in _FILES.items():
