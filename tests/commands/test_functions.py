@@ -29,6 +29,9 @@ def legs(**more):
     )  # fmt: skip
 
 
+ACT = viewer.animate(leg(), np.zeros((4, 2, 3)), fps=10)
+
+
 # Findings.
 
 
@@ -211,6 +214,17 @@ def test_rig_binds_a_mesh_to_a_skeleton(tmp_path):
         (lambda: viewer.retarget(viewer.Actor(leg()), "body"), "figure has no motion of joints"),
         (lambda: viewer.rig("fox", methd=3), r"^rig: no option .*did you mean method\?"),
         (lambda: viewer.rig("fox", fit=3), "^fit: expected True or False, found 3"),
+        (lambda: viewer.rig("fox", ACT), "^template: expected paths or names, found Actor"),
+        (lambda: viewer.rig("fox", skeleton=[]), "^skeleton: expected paths or names, found an em"),
+        (lambda: viewer.rig(ACT, "body", auto=True), "^template and auto: expected one of them"),
+        (lambda: viewer.rig([]), "^rig: expected a scene, an actor or paths, found an empty list"),
+        (lambda: viewer.lint(()), "^lint: expected a scene, an actor or paths, found an empty tup"),
+        (lambda: viewer.diff("fox", []), "^diff: expected a scene, .* found an empty list"),
+        (lambda: viewer.lint(ACT, ignore="Q99"), "; (did you|viewer lint --codes lists them$)"),
+        (lambda: viewer.clean(ACT, smooth="x"), "^smooth: expected one-euro or savgol, found x$"),
+        (lambda: viewer.retarget(["a", "b"], "body"), "^retarget: expected one path, found 2; "),
+        (lambda: viewer.retarget("fox", "body"), "^retarget: expected a motion of joints, found"),
+        (lambda: viewer.retarget(ACT, "body"), "matching joint.* with joint_map$"),
         (lambda: viewer.load(["fox"]), "^load: expected paths or names, found list"),
         (lambda: viewer.load("fox", gender="x"), '^gender: expected female or male or neutral'),
     ],
@@ -232,7 +246,6 @@ def test_file_of_tensors_is_the_same_body_as_on_the_command_line(has_model, tmp_
     assert actor.figure.mesh.n_vertices == told["mesh"]["vertices"]
 
 
-ACT = viewer.animate(leg(), np.zeros((4, 2, 3)), fps=10)
 TINY = (32, 24)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from viewer.commands._frames import parse_range, rate
 from viewer.commands._keywords import arguments_of, without_dashes
 from viewer.commands._settings import add_settings, settings_of
+from viewer.commands._usage import FILES_BEFORE
 from viewer.errors import ViewerError
 from viewer.loading.settings import CleanUp
 from viewer.phrases import printable
@@ -132,8 +133,7 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
     name, _, rest = text.partition(":")
     if name not in _KEYS:
         raise argparse.ArgumentTypeError(
-            f"expected one-euro or savgol, or no value and the files before the option, found "
-            f"{printable(text, 60)}"
+            f"expected one-euro or savgol{FILES_BEFORE}, found {printable(text, 60)}"
         )
     values = {}
     for part in filter(None, rest.split(",")):
@@ -219,7 +219,6 @@ def _longest(text: str) -> int:
     """Return the length of the longest gap in frames."""
     if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
         raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or no value and the files before the option, found "
-            f"{printable(text, 60)}"
+            f"expected a number of frames{FILES_BEFORE}, found {printable(text, 60)}"
         )
     return int(text)

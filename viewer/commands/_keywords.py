@@ -15,12 +15,12 @@ from typing import NoReturn
 
 import numpy as np
 
-from viewer.commands._usage import Parser
+from viewer.commands._usage import FILES_BEFORE, Parser
 from viewer.errors import FormatError, ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import all_of, printable
 
-_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)")
+_OPTION = re.compile(r"viewer [a-z]+ --[a-z-]+|--([a-z]+(?:-[a-z]+)*)")  # commands stay
 
 
 class _KeywordParser(Parser):
@@ -28,7 +28,7 @@ class _KeywordParser(Parser):
 
     def error(self, message: str) -> NoReturn:
         """Raise ViewerError without advice about the command line."""
-        raise ViewerError(message.removeprefix("argument "))
+        raise ViewerError(message.removeprefix("argument ").replace(FILES_BEFORE, ""))
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> object:
         """Return the value of an option; argparse would name the function that reads it."""
@@ -43,14 +43,17 @@ class _KeywordParser(Parser):
             ) from None
 
 
-def paths_of(function: str, what: object) -> list[str]:
-    """Return paths or names of models: one, or a sequence of them."""
+def paths_of(name: str, what: object, kinds: str = "a scene, an actor or paths") -> list[str]:
+    """Return paths or names of models: one, or a sequence of them.
+
+    ``name``, ``kinds``: the function or argument, and what it takes, for errors.
+    """
     found = [*what] if isinstance(what, list | tuple) else [what]
+    if not found:  # the commands would open the bundled figure
+        raise ViewerError(f"{name}: expected {kinds}, found an empty {type(what).__name__}")
     for each in found:
         if not isinstance(each, str | Path):
-            raise ViewerError(
-                f"{function}: expected a scene, an actor or paths, found {type(each).__name__}"
-            )
+            raise ViewerError(f"{name}: expected {kinds}, found {type(each).__name__}")
     return [*map(str, found)]
 
 
@@ -138,13 +141,21 @@ def _text(name: str, value: object) -> str:
 
 
 @contextmanager
-def without_dashes() -> Iterator[None]:
-    """Name settings in errors as in Python: messages of the command name its options."""
+def without_dashes(**names: str) -> Iterator[None]:
+    """Name settings in errors as in Python: messages of the command name its options.
+
+    ``names``: arguments with another name than the option.
+    """
     try:
         yield
     except ViewerError as problem:
         text = str(problem).removeprefix("--scalar ")
-        named = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
+
+        def name_of(found: re.Match[str]) -> str:
+            name = (found[1] or found[0]).replace("-", "_")
+            return found[0] if found[1] is None else names.get(name, name)
+
+        named = _OPTION.sub(name_of, text)
         if named == str(problem) or isinstance(problem, FormatError):
             raise
         raise type(problem)(named) from None

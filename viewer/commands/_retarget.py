@@ -12,7 +12,7 @@ from viewer.commands._frames import Frames
 from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._scene import SceneOptions, add_driving_arguments
 from viewer.commands._settings import add_settings, settings_of
-from viewer.errors import RigError
+from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect
 from viewer.loading import MotionSettings, load
 from viewer.models import resolve
@@ -28,6 +28,7 @@ from viewer.rigs.scene import Actor, Scene, pose_actors
 
 _SKELETONS = ("bvh", "gltf", "fbx")
 """Formats of motions with a skeleton of their own, which drive any figure."""
+_NO_MOTION = "retarget: expected a motion of joints, found none"
 
 
 def retarget(
@@ -74,9 +75,23 @@ def retarget(
         settings = settings_of(
             MotionSettings, arguments, frame_rate=arguments.fps, joint_map=joint_map
         )
-    if isinstance(motion, Scene | Actor) or isinstance(onto, Scene | Actor):
-        return _between(_moving(motion, settings), _target(onto), settings)
-    (source,), (target,) = paths_of("retarget", motion), paths_of("retarget", onto)
+        if isinstance(motion, Scene | Actor) or isinstance(onto, Scene | Actor):
+            return _between(_moving(motion, settings), _target(onto), settings)
+        return _of_files(_one_path(motion), _one_path(onto), settings)
+
+
+def _one_path(what: object) -> str:
+    """Return the path or name that an argument consists of."""
+    found = paths_of("retarget", what)
+    if len(found) > 1:
+        raise ViewerError(
+            f"retarget: expected one path, found {len(found)}; viewer.load opens several as a scene"
+        )
+    return found[0]
+
+
+def _of_files(source: str, target: str, settings: MotionSettings) -> Scene:
+    """Return a figure that a file drives, as the command line opens them."""
     kind = detect(Source.open(resolve(source)))
     if kind == "bvh":
         scene = load(source, motion=replace(settings, model=target))
@@ -84,6 +99,8 @@ def retarget(
         scene = load(target, motion=replace(settings, motions=(resolve(source),)))
     else:
         scene = load(source, target, motion=settings)
+    if not any(actor.clip is not None for actor in scene):
+        raise RigError(_NO_MOTION)
     moved = [actor for actor in scene if actor.clip is not None and actor.figure.is_attached]
     if not moved:
         why = "".join(f"; {found}" for found in scene.diagnostics[-1:])
@@ -109,7 +126,7 @@ def _moving(motion: Scene | Actor | str | Path, settings: MotionSettings) -> Act
         scene = load(*paths_of("retarget", motion), motion=settings)
     found = next((actor for actor in scene if actor.joint_motion is not None), None)
     if found is None:
-        raise RigError("retarget: expected a motion of joints, found none")
+        raise RigError(_NO_MOTION)
     return found
 
 

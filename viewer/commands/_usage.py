@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _NUMBER = re.compile(r"-\.?\d")  # start of a value or file name, not of an option
 _NAME = re.compile(r"[^\W_][\w-]*")  # a possible command; most files have a suffix or a folder
 _WORD = re.compile(r"[^\W\d_]+")  # one that may be misspelt
+FILES_BEFORE = ", or no value and the files before the option"
+"""Remedy if a file is read as the value of an option that may have none."""
 _LONGEST = 60  # maximum length of a name in a message, characters
 
 

@@ -209,7 +209,7 @@ def _ignored(arguments: argparse.Namespace) -> set[str]:
     ignored = {code.strip().upper() for code in arguments.ignore.split(",") if code.strip()}
     unknown = sorted(ignored - CODES.keys())
     if unknown:
-        hint = did_you_mean(unknown[0], CODES) or "--codes lists them"
+        hint = did_you_mean(unknown[0], CODES) or "viewer lint --codes lists them"
         raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
     return ignored
 

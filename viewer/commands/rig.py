@@ -273,15 +273,19 @@ def rig(
     """
     from viewer.diagnostics.record import recorded
 
-    given = {"from": template, "skeleton": skeleton}
-    words = {name: paths_of("rig", what) for name, what in given.items() if what is not None}
+    given = {"template": template, "skeleton": skeleton}
+    words = {
+        name: paths_of(name, what, "paths or names")
+        for name, what in given.items()
+        if what is not None
+    }
     own = "output", "force", "clip", "view", "from", "skeleton"
     of_motion = "bones", "tolerance", "bind_frame", "animation"
     without = (*own, *of_motion, "vrm_name", "vrm_author", "vrm_licence")
     arguments = arguments_of("rig", add_arguments, options, without, ["a"])
-    arguments.template, arguments.skeleton = words.get("from", []), words.get("skeleton", [])
+    arguments.template, arguments.skeleton = words.get("template", []), words.get("skeleton", [])
     inputs: list[Path] = []
-    with without_dashes(), recorded() as said:
+    with without_dashes(**{"from": "template"}), recorded() as said:
         figure = (
             _one_mesh(scene_of(target, "rig"))
             if isinstance(target, Scene | Actor)
