@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.constraints.evaluation import constrained_matrices
@@ -117,6 +118,7 @@ def rest_pose(skeleton: Skeleton) -> Pose:
     Pose
         Pose that shares no array with the skeleton.
     """
+    check_type("skeleton", skeleton, Skeleton)
     return Pose(
         dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
         translations=np.zeros((skeleton.n_joints, 3)),

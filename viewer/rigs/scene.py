@@ -379,6 +379,10 @@ class Scene:
     """Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
     None if there is only one space."""
 
+    def __post_init__(self) -> None:
+        for actor in self.actors:
+            check_type("actors", actor, Actor)
+
     def __repr__(self) -> str:
         count, found = len(self.actors), len(self.diagnostics)
         beside = f", {counted(found, 'finding')} in .diagnostics" if found else ""

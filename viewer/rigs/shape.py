@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import translation_matrix
@@ -47,6 +48,8 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     FormatError
         If the offsets are read by this call and the file is invalid.
     """
+    check_type("figure", figure, Figure)
+    weights = np.asarray(weights)
     mesh, shapes = figure.mesh, figure.blend_shapes
     if shapes is None or mesh is None or not weights.any():
         return figure
@@ -112,6 +115,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     """
     from viewer.rigs.blendshapes import regress_joints
 
+    check_type("figure", figure, Figure)
     mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
     normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
     new_mesh = replace(mesh, positions=positions, normals=normals)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.diagnostics import Phrase, note
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints
@@ -153,6 +154,8 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     RigError
         If the skeleton is not symmetric and the file states no human bones.
     """
+    check_type("figure", figure, Figure)
+    check_type("pose", pose, Pose)
     partners = posing_partners(figure)
     skeleton = figure.require_skeleton()
     is_alone = partners < 0

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
+from types import NoneType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -142,6 +143,7 @@ def deform(
     True
     """
     check_type("figure", figure, Figure)
+    check_type("pose", pose, Pose, NoneType)
     how = Skinning(method) if isinstance(method, str) else method
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
@@ -214,6 +216,8 @@ def deform_frames(
     RigError
         If the figure cannot be skinned, there are no poses, or the method is not LBS.
     """
+    check_type("figure", figure, Figure)
+    check_type("poses", poses, Sequence)
     how = skinning or Skinning()
     if not poses or not figure.is_attached or how.method != "lbs":
         raise RigError("expected poses, a figure with mesh, skeleton and skin, and method lbs")
@@ -246,6 +250,8 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     (J, 4, 4)
         Joint space to figure space.
     """
+    check_type("figure", figure, Figure)
+    check_type("pose", pose, Pose)
     skeleton = shaped_skeleton(figure, pose.shape_weights)
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
