@@ -91,11 +91,14 @@ class Browser:
         elif event["method"] == "Network.requestWillBeSent":
             self.requests.append(values["request"]["url"])
 
-    def open(self, path: Path) -> None:
+    def open(self, path: Path, fragment: str = "") -> None:
         """Open a page from disk and wait until its figures are drawn."""
+        if fragment:  # a change of the fragment alone does not load the page again
+            self.send("Page.navigate", url="about:blank")
         self.messages.clear()
         self.requests.clear()
-        self.send("Page.navigate", url=path.resolve().as_uri())
+        address = path.resolve().as_uri() + (f"#{fragment}" if fragment else "")
+        self.send("Page.navigate", url=address)
         self.run(_LOADED)
         self.run("viewer.ready.then(() => null)")
         self.settle()

@@ -140,6 +140,9 @@ def test_camera_follows_the_mean_of_the_joints(browser, tmp_path):
     assert_allclose(browser.run(target), before + moves[3] - moves[0], atol=1e-4)
     browser.run("document.getElementById('follow').click(); viewer.seek(0)")
     assert_allclose(browser.run(target), before + moves[3] - moves[0], atol=1e-4)
+    browser.open(tmp_path / "a.html", "follow&time=0.3")
+    assert_allclose(browser.run(target), before + moves[3] - moves[0], atol=1e-4)
+    assert browser.messages == []
 
 
 @needs_chromium

@@ -109,6 +109,7 @@ class Page {
 
   // Keeps the camera at a figure; null for a camera that stays.
   follow(figure) {
+    this.pose();  // the address of the page may ask for it before anything is drawn
     this.followed = figure;
     if (figure) this.followedAt = figure.place;
     this.change();
