@@ -127,6 +127,23 @@ def test_divider_shows_a_figure_on_each_side_in_one_place(browser, tmp_path):
 
 
 @needs_chromium
+def test_long_names_stay_within_a_narrow_screen(browser, tmp_path):
+    first, second = bent(5, 20 * "first "), bent(6, 20 * "second ")
+    still(tmp_path / "a.html", first, second, page=PageOptions(wipes=True))
+    screen = {"width": 360, "height": 640, "deviceScaleFactor": 1, "mobile": True}
+    browser.send("Emulation.setDeviceMetricsOverride", **screen)
+    browser.open(tmp_path / "a.html")
+    boxes = "[left, right].map(each => each.getBoundingClientRect().toJSON())"
+    for part in (0.5, 0.2):
+        browser.run(f"viewer.ready.then(p => {{ p.divider = {part}; p.panels.showDivider(); }})")
+        left, right = browser.run(f"(({{ left, right }}) => {boxes})(document.all)")
+        assert 0.0 <= left["left"] < left["right"] < 360 * part
+        assert 360 * part < right["left"] < right["right"] <= 360.0
+    assert browser.run("document.documentElement.scrollWidth") == 360
+    browser.send("Emulation.clearDeviceMetricsOverride")
+
+
+@needs_chromium
 def test_camera_follows_the_mean_of_the_joints(browser, tmp_path):
     figure = bent(7).figure
     rotations = np.tile(np.eye(3), (4, 6, 1, 1))

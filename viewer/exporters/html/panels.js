@@ -124,9 +124,11 @@ class Panels {
     element("divider").hidden = !isDivided;
     element("divider").style.left = `${100 * divider}%`;
     element("divider").setAttribute("aria-valuenow", Math.round(100 * divider));
-    for (const side of ["left", "right"])
+    for (const [side, part] of [["left", divider], ["right", 1 - divider]]) {
       element(side).textContent = figures.filter((each) => each.side === side)
         .map((each) => each.data.name).join(", ");
+      element(side).style.maxWidth = `calc(${100 * part}vw - 16px)`;
+    }
   }
 
   connectTimeline() {
