@@ -87,6 +87,14 @@ def test_bones_outside_the_mesh_are_counted():
     assert far["inside"].value == 0.0 and far["depth"].value == 0.0
 
 
+def test_bones_outside_the_template_say_nothing_about_the_target():
+    beside = body(joints=JOINTS + np.array([0, 0, 9.0]))
+    found = findings(beside, body(), PARENTS, alignment())
+    keys = {finding.sentence[5:].split(":")[0] for finding in found}
+    assert "volume" in keys and not keys & {"inside", "depth"}
+    assert confidence(found) == 1.0
+
+
 def test_lengths_are_relative_to_the_median():
     joints = np.array([[0.0, 0, 0], [0.1, 0, 0], [2, 0, 0]])
     found = values(body(joints=joints))

@@ -148,9 +148,6 @@ def findings(
     bones = np.stack([parents[ends], ends], axis=1)
     lengths = _lengths(target, bones) / np.maximum(_lengths(template, bones), 1e-12)
     scale = float(np.median(lengths))
-    own, other = (_depths(body, bones) for body in (template, target))
-    inside = own > 0.0
-    ratios = other[inside] / (scale * own[inside])
     return (
         Finding(
             "R017.surface: template and target are {value:.1%} of the size apart",
@@ -164,18 +161,7 @@ def findings(
             wrong=0.12,
             good=0.06,
         ),
-        Finding(
-            "R017.inside: only {value:.0%} of the bones are inside the mesh",
-            float((other[inside] > 0.0).mean()),
-            wrong=0.3,
-            good=0.7,
-        ),
-        Finding(
-            "R017.depth: bones are only {value:.2g} times as deep inside as in the template",
-            float(np.median(ratios)),
-            wrong=0.1,
-            good=0.4,
-        ),
+        *_bones_inside(template, target, bones, scale),
         Finding(
             "R017.thickness: the mesh is only {value:.2g} times as thick as the template",
             _thickness(target) / max(_thickness(template), 1e-12),
@@ -199,6 +185,28 @@ def findings(
             float(lengths.max()) / scale,
             wrong=8.0,
             good=4.0,
+        ),
+    )
+
+
+def _bones_inside(template: Body, target: Body, bones: Ints, scale: float) -> tuple[Finding, ...]:
+    """Return findings about bones that are inside the template, none without any."""
+    own, other = (_depths(body, bones) for body in (template, target))
+    inside = own > 0.0
+    if not inside.any():
+        return ()
+    return (
+        Finding(
+            "R017.inside: only {value:.0%} of the bones are inside the mesh",
+            float((other[inside] > 0.0).mean()),
+            wrong=0.3,
+            good=0.7,
+        ),
+        Finding(
+            "R017.depth: bones are only {value:.2g} times as deep inside as in the template",
+            float(np.median(other[inside] / (scale * own[inside]))),
+            wrong=0.1,
+            good=0.4,
         ),
     )
 
@@ -230,8 +238,9 @@ def _kept(body: Body, parents: Ints, bones: Ints) -> float:
     """Return the fraction of the volume that remains if all joints bend, the lower of two poses."""
     before = volume(body.positions, body.triangles)
     axis = np.zeros((len(parents), 3))
-    axis[bones[:, 0]] = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
-    axis[bones[:, 1]] = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
+    along = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
+    axis[bones[:, 0]] = along
+    axis[bones[:, 1]] = along
     across = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     found = []
     for axes in (across, np.cross(axis, across)):
