@@ -3,12 +3,15 @@
 The surface of a template can be pressed into any shape, so a small distance between the surfaces
 says little. A rig is right if the limbs of the template are where the target has limbs:
 
-- the surfaces meet, from the target to the template and back;
-- the limbs found in the solid of the target account for its long protrusions;
+- the surfaces meet, from the target to the template and back, more closely if no limbs were found;
 - bones are inside the solid, as deep as in the template;
 - the solid is as thick as that of the template: a picture cut out of cardboard is not;
-- limbs have 0.3 to 4 times the length of the template's, and both sides are alike;
+- bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
+
+Nothing is said about what no threshold separates. Both sides are alike, as the fit scales them
+together. A rabbit has ears longer than its legs, and its head is no higher than that of a person
+whose rig is upside down.
 
 Each finding is rated from 0, wrong, to 1, as for figures that are rigged well; the least rating is
 the confidence.
