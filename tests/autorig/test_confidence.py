@@ -153,7 +153,8 @@ def test_wrong_rig_is_refused_unless_insisted_on():
     positions, triangles = figure.mesh.positions, figure.mesh.triangles
     sheet = mesh_of(positions * [1.0, 1.0, 0.02], triangles)
     pose = rest_pose(figure.skeleton)
-    how = TransferSettings(alignment=AlignmentSettings(samples=100), fits=False)
+    known = AlignmentSettings(up="y", facing="z", samples=100)
+    how = TransferSettings(alignment=known, fits=False)
     with pytest.raises(RigError, match="times as thick as the template"):
         transfer(figure, pose, sheet, how)
     kept = transfer(figure, pose, sheet, replace(how, insists=True))
