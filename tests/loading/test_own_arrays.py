@@ -166,6 +166,11 @@ def test_arrays_that_do_not_fit_are_named(changes, message):
         (np.zeros((3, 2, 5)), {}, r"rotations: expected one of .*, found shape \(3, 2, 5\)"),
         (np.zeros((3, 2, 3)), {"representation": "euler"}, 'expected one of .*, found "euler"'),
         (np.zeros((3, 9, 3)), {}, r"rotations: expected shape \(N, 2, 3\), found \(3, 9, 3\)"),
+        (-np.tile(np.eye(3), (3, 2, 1, 1)), {}, r"rotations\[0, 0\]: expected a rotation matrix"),
+        (2 * np.tile(np.eye(3), (3, 2, 1, 1)), {}, r"rotations\[0, 0\]: expected a rotation"),
+        (np.zeros((3, 2, 6)), {}, r"rotations\[0, 0\]: expected two columns of a matrix, found"),
+        (np.zeros((0, 2, 3)), {}, "rotations: expected at least one frame, found none"),
+        ("x", {}, "rotations: expected an array of numbers"),
         (np.zeros((3, 2, 4)), {}, r"rotations\[0, 0\]: expected a quaternion, found zeros"),
         (
             np.zeros((3, 2, 3)),

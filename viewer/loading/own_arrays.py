@@ -58,6 +58,7 @@ _SHAPES: dict[Rotations, tuple[int, ...]] = {
     "rotation_vector": (3,),
     "6d": (6,),
 }
+_SKEWED = 0.01  # error of R R^T at which a matrix is no rotation; half precision has 0.002
 
 
 def figure(
@@ -320,7 +321,10 @@ def _skin(
 
 def _quaternions(rotations: ArrayLike, n_joints: int, representation: Rotations | None) -> Floats:
     """Return rotations of any representation as unit quaternions: (F, J, 4)."""
-    found = np.asarray(rotations, dtype=np.float64)
+    try:
+        found = np.asarray(rotations, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RigError("rotations: expected an array of numbers") from None
     kind = representation
     if kind is None:
         kind = next((each for each, shape in _SHAPES.items() if found.shape[2:] == shape), None)
@@ -329,17 +333,29 @@ def _quaternions(rotations: ArrayLike, n_joints: int, representation: Rotations 
         what = f'"{kind}"' if kind is not None else f"shape {found.shape}"
         raise RigError(f"rotations: expected one of {known}, found {what}")
     values = _numbers("rotations", found, (None, n_joints, *_SHAPES[kind]))
+    if not len(values):
+        raise RigError("rotations: expected at least one frame, found none")
     if kind == "matrix":
+        apart = np.abs(values @ np.swapaxes(values, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+        is_rotation = (apart < _SKEWED) & (np.linalg.det(values) > 0.0)
+        _check_rotations(is_rotation, "a rotation matrix, found one that scales, shears or mirrors")
         return matrix_to_quaternion(values)
     if kind == "rotation_vector":
         return rotation_vector_to_quaternion(values)
     if kind == "6d":
+        areas = np.linalg.norm(np.cross(values[..., :3], values[..., 3:]), axis=-1)
+        _check_rotations(areas > 0.0, "two columns of a matrix, found parallel ones or zeros")
         return matrix_to_quaternion(_from_columns(values))
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
-    if not (lengths > 0.0).all():
-        frame, joint = np.argwhere(lengths[..., 0] == 0.0)[0].tolist()
-        raise RigError(f"rotations[{frame}, {joint}]: expected a quaternion, found zeros")
+    _check_rotations(lengths[..., 0] > 0.0, "a quaternion, found zeros")
     return values / lengths
+
+
+def _check_rotations(is_valid: Bools, expected: str) -> None:
+    """Raise at the first rotation (F, J) that is not valid."""
+    if not is_valid.all():
+        frame, joint = np.argwhere(~is_valid)[0].tolist()
+        raise RigError(f"rotations[{frame}, {joint}]: expected {expected}")
 
 
 def _from_columns(values: Floats) -> Floats:
