@@ -127,11 +127,9 @@ def test_bind_frame_is_the_rest_pose():
     np.testing.assert_allclose(skinned, positions, atol=1e-8)
 
 
-def test_blend_shapes_become_bones(tmp_path, capsys):
+def test_blend_shapes_become_bones(tmp_path, capsys, shared_data):
     """A corner of a box is pulled out by a blend shape."""
-    from conftest import SHARED_DATA
-
-    cube = SHARED_DATA / "gltf" / "01_morphed_cube_no_uv.gltf"
+    cube = shared_data / "gltf" / "01_morphed_cube_no_uv.gltf"
     if not cube.exists():
         pytest.skip("needs ../shared/data")
     out = tmp_path / "cube.glb"
@@ -156,6 +154,11 @@ def test_blend_shapes_become_bones(tmp_path, capsys):
         (["--from", "fox"], "--from: expected one mesh without a motion, found several meshes"),
         (["--up", "z"], "--up: expected one mesh without a motion, found several meshes"),
         (["--frame", "0"], "--frame: expected one mesh without a motion, found several meshes"),
+        (["--no-fit"], "--no-fit: expected one mesh without a motion, found several meshes"),
+        (["--scale", "none"], "--scale: expected one mesh without a motion, found several meshes"),
+        (["--max-angle", "9"], "--max-angle: expected one mesh without a motion, found several"),
+        (["--joint-spacing", "2"], "--joint-spacing: expected one mesh without a motion, found"),
+        (["--dof", "hip.x=1"], "--dof: expected one mesh without a motion, found several meshes"),
         (["--bones", "0"], "--bones: expected auto or 1 to 10,000, found 0"),
         (["--tolerance", "0"], "--tolerance: expected 0.0001 to 100, found 0"),
         (["--bind-frame", "7"], "bind frame: expected a frame from 1 to 4, found 7"),
@@ -174,6 +177,17 @@ def test_one_still_mesh_has_no_motion(tmp_path, capsys):
     (file,) = write_frames(tmp_path, "box", positions[:1], faces)
     assert run(["rig", str(file), "--bones", "2"]) == 2
     assert "--bones: expected one mesh that moves, found 0 among 1 mesh" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words", [["--tolerance", "1"], ["--bind-frame", "0"], ["--animation", "2"]]
+)
+def test_options_of_a_motion_need_one(tmp_path, capsys, words):
+    positions, faces = two_boxes()
+    (file,) = write_frames(tmp_path, "box", positions[:1], faces)
+    assert run(["rig", str(file), *words]) == 2
+    message = f"{words[0]}: expected --bones or several mesh files, found neither"
+    assert message in capsys.readouterr().err
 
 
 def test_folder_of_frames_is_a_sequence(tmp_path, capsys):

@@ -97,6 +97,17 @@ def stated(kind: type, arguments: argparse.Namespace) -> set[str]:
     }
 
 
+def changed(kind: type, arguments: argparse.Namespace) -> list[str]:
+    """Return the options of the fields whose value is not the default one."""
+    found: object = settings_of(kind, arguments)
+    usual = kind()
+    return [
+        _flag(each)
+        for name, each in _options(kind).items()
+        if getattr(found, name) != getattr(usual, name)
+    ]
+
+
 def destinations(kind: type, without: str = "") -> list[str]:
     """Return the names of the fields' options among the arguments, in the order of the fields."""
     return [_destination(each) for name, each in _options(kind).items() if name != without]

@@ -34,7 +34,7 @@ from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._settings import add_settings, settings_of
+from viewer.commands._settings import add_settings, changed, settings_of
 from viewer.commands.convert import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
@@ -419,17 +419,18 @@ def _check_only_motion(arguments: argparse.Namespace) -> None:
         "--landmarks": arguments.landmarks,
         "--method": arguments.method,
         "--smooth": arguments.smooth,
-        "--up": arguments.up,
-        "--facing": arguments.facing,
+        "--template-pose": arguments.pose,
+        "--rig": arguments.rig is not None,
         "--frame": arguments.frame is not None,
         "--time": arguments.time is not None,
-        "--template-pose": arguments.pose,
         "--template-frame": arguments.template_frame is not None,
     }
-    for option, is_given in given.items():
-        if is_given:
-            found = "--bones" if arguments.bones is not None else "several meshes"
-            raise ViewerError(f"{option}: expected one mesh without a motion, found {found}")
+    kinds = (TransferSettings, MatchSettings, SkeletonSettings, AlignmentSettings, PoseOptions)
+    unused = [option for option, is_given in given.items() if is_given]
+    unused += [option for kind in kinds for option in changed(kind, arguments)]
+    if unused:
+        found = "--bones" if arguments.bones is not None else "several meshes"
+        raise ViewerError(f"{unused[0]}: expected one mesh without a motion, found {found}")
 
 
 def _moving_figure(arguments: argparse.Namespace, frames: Frames) -> MovingMesh:
@@ -539,6 +540,11 @@ def _check_options(arguments: argparse.Namespace) -> None:
     if len(found) > 1:
         all_found = "both" if len(found) == 2 else "all"
         raise ViewerError(f"{' and '.join(found)}: expected one of them, found {all_found}")
+    of_motion = changed(DecompositionSettings, arguments)
+    of_motion += ["--bind-frame"] if arguments.bind_frame is not None else []
+    of_motion += ["--animation"] if arguments.animation else []
+    if of_motion:
+        raise ViewerError(f"{of_motion[0]}: expected --bones or several mesh files, found neither")
     if settings_of(SkeletonSettings, arguments) != SkeletonSettings() and not arguments.auto:
         raise ViewerError("--symmetry and --joint-spacing: expected --auto, found none")
     if not arguments.skeleton and not arguments.auto:
