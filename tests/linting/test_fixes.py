@@ -71,6 +71,14 @@ def test_sums_and_signs_are_corrected():
     assert weights_of(figure)[7].tolist() == [1.0, 0.0]
 
 
+def test_actors_of_one_figure_still_share_it():
+    figure = weighted({5: [(0, 0.9)]})
+    scene = Scene([Actor(figure), Actor(figure)])
+    (_note,) = fix_scene(scene).notes
+    one, other = scene.actors
+    assert one.figure is other.figure and weights_of(one.figure)[5].tolist() == [1.0, 0.0]
+
+
 def test_vertex_without_weights_gets_those_of_its_neighbours():
     """Of vertex 11, two are below it, with joint 0, two above, and two on its ring, with both."""
     figure, _ = fixed(weighted({11: []}), weights)

@@ -16,6 +16,7 @@ from viewer.linting._finding import Finding, LintOptions
 from viewer.linting._running import lint_scene
 from viewer.linting._subject import Subject
 from viewer.progress import report
+from viewer.rigs.figure import Figure
 from viewer.rigs.scene import Scene, pose_actors
 
 _ROUNDS = 8  # smoothing may need several; a fix that changes nothing ends them
@@ -78,15 +79,24 @@ def fix_scene(
             assert finding.actor is not None  # findings of checks are about actors
             subject = Subject(scene.actors[finding.actor], finding.actor, scene.up, chosen)
             fix: Fix = import_module(f"{__name__}.{FIXES[finding.code]}").fix
+            figure = subject.actor.figure
             said = fix(subject, finding)
             if said is None:
                 tried.add(_key(finding))
             else:
                 notes.append(said)
+                _share(scene, figure, subject.actor.figure)
     if scene.time is not None:
         pose_actors(scene.actors, scene.time)
     left = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
     return Fixed(_merged(notes), left)
+
+
+def _share(scene: Scene, old: Figure, new: Figure) -> None:
+    """Replace a figure also in the other actors that have it: files store it once."""
+    for actor in scene.actors:
+        if actor.figure is old:
+            actor.figure = new
 
 
 def _key(finding: Finding) -> tuple[int, str]:
