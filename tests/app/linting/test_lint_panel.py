@@ -10,6 +10,8 @@ import pytest
 from imgui_bundle import imgui
 from linting.planted import weighted
 from linting.sound import FRAMES, RATE, column, keypoints, scene_of, standing
+from linting.test_bad_keys import RATE as KEY_RATE
+from linting.test_bad_keys import K, about_z, arm, waving
 from linting.test_rechecks import TEXTS
 from rigs.animated import animated_leg, bow, channel, clip_of
 
@@ -26,6 +28,7 @@ from viewer.rendering.overlay.annotation import MARK_COLOR
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.animation_choice import play_animation
 from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rigs.scene import Actor, Scene
 
 PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
@@ -274,6 +277,36 @@ def test_fix_is_one_step_of_undo_and_is_checked_again(lint):
     assert not unsaved_edits(hand.state)
     assert hand.state.scene.actors[0].figure is LIGHT
     assert not hand.state.history.can_undo
+
+
+def grown() -> Scene:
+    """Return an arm with keys of the scale of a joint, beside those of its elbow."""
+    scales = TransformChannel(2, "scale", [0.0, 1.0], np.full((2, 3), 1.4))
+    bends = TransformChannel(3, "rotation", K / KEY_RATE, about_z(waving()))
+    return scene_of(arm(), TransformClip("x", (scales, bends), 0.0, 1.9))
+
+
+def test_joints_are_at_rest_once_their_keys_are_deleted(lint):
+    hand = lint(grown())
+    assert "C023" in codes(hand)
+    hand.click("Fix")
+    hand.state.job.wait()
+    hand.step(3)
+    finish(hand)
+    assert "C023" not in codes(hand)
+    np.testing.assert_array_equal(hand.state.scene.actors[0].pose.scales, 1.0)
+
+
+def test_scene_that_changes_while_it_is_fixed_stays_as_it_is(lint):
+    hand = lint(LIGHT)
+    hand.click("Fix")
+    hand.state.job.wait()
+    other = weighted({6: [(0, 0.9)]})
+    hand.state.scene.actors[0].figure = other
+    hand.step(3)
+    assert hand.state.scene.actors[0].figure is other
+    said = [note.text for note in hand.state.messages.notes]
+    assert "Nothing was fixed: the scene changed meanwhile" in said
 
 
 def test_captured_points_are_marked(lint):

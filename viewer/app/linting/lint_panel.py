@@ -434,13 +434,21 @@ def _start_fixing(state: AppState) -> None:
         return []
 
     def show() -> None:
-        if state.scene is not source or len(source.actors) != len(before):
-            return  # other files were opened meanwhile
-        for actor, fixed, (figure, clip) in zip(source.actors, copy.actors, before, strict=True):
-            if actor.figure is figure and actor.clip is clip:
-                if fixed.figure is not figure:
-                    state.of(SavedWork).edited.add(fixed.figure)
-                actor.figure, actor.clip = fixed.figure, fixed.clip
+        actors = source.actors if state.scene is source else []
+        is_same = len(actors) == len(before) and all(
+            actor.figure is figure and actor.clip is clip
+            for actor, (figure, clip) in zip(actors, before, strict=True)
+        )
+        if not is_same:
+            state.say_status("Nothing was fixed: the scene changed meanwhile")
+            return
+        for actor, fixed in zip(actors, copy.actors, strict=True):
+            if fixed.figure is not actor.figure:
+                state.of(SavedWork).edited.add(fixed.figure)
+                actor.figure = fixed.figure
+            if fixed.clip is not actor.clip:
+                # Joints whose keys were deleted are at rest.
+                actor.clip, actor.pose = fixed.clip, fixed.pose
         state.say(*notes)
         state.say_status(f"Fixed: {counted(len(notes), 'change')}")
         state.of(Linting).wants_check = True
