@@ -13,18 +13,22 @@ from pathlib import Path
 import numpy as np
 from fault_files import (
     Character,
+    Course,
     character,
+    euler_angles,
     islands,
     matrices,
     product,
     quaternion,
     write_bvh,
+    write_course,
     write_glb,
 )
 
 import viewer
 from viewer.linting import Finding, lint_files
 from viewer.loading import bundled_body
+from viewer.rigs.geometry.transform import apply_transform, translation_matrix
 from viewer.rigs.geometry.vectors import unit
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -73,6 +77,10 @@ def changed_weights(one: Character, change: Callable[[np.ndarray], object]) -> N
     change(one.weights)
     total = one.weights.sum(axis=1, keepdims=True)
     one.weights /= np.where(total > 0.0, total, 1.0)
+
+
+def changed(name: str, value: object) -> Change:
+    return lambda one: setattr(one, name, value)
 
 
 def faults_of(who: Character, roles: Roles, rng: np.random.Generator) -> Iterator[Fault]:
@@ -459,7 +467,13 @@ def walking_body() -> Character:
         poses = found.poses.reshape(len(found.poses), -1)
         np.savez(path, poses=poses, trans=found.translations, betas=np.zeros(10),
                  gender="neutral", mocap_framerate=30.0)  # fmt: skip
-        return character(bundled_body(), path, up="y")
+        one = character(bundled_body(), path, up="y")
+    # The walk is on a floor at 0, and so is the body at rest.
+    rise = translation_matrix([0.0, -one.points[:, 1].min(), 0.0])
+    one.points = apply_transform(rise, one.points)
+    one.rest[0] = apply_transform(rise, one.rest[0])
+    one.binds = one.binds @ np.linalg.inv(rise)
+    return one
 
 
 def characters() -> dict[str, Callable[[], Character]]:
@@ -538,15 +552,89 @@ def bvh_faults(who: Character, r: Roles, rng: np.random.Generator) -> Iterator[F
     for fault in motion_faults(who, r, rng):
         if not set(fault.codes.split()) & {"C023", "C025"}:
             yield fault
-
-    def changed(name, value):
-        return lambda one: setattr(one, name, value)
-
     yield Fault("implausible frame time", "C017", [changed("step", 33.3), changed("step", 1e-5)])
     yield Fault("name twice", "S006 F007", [
         lambda one: one.names.__setitem__(who[r.elbow], who.names[who[r.knee]])])  # fmt: skip
     yield Fault("rotation not a number", "F003", [
         lambda one: one.rotations.__setitem__((5, who[r.elbow]), np.nan)])  # fmt: skip
+
+
+# Faults of other formats that files of the course can also have
+COURSE = {
+    "stray vertex", "30 % stray", "2 % leak", "negative weight", "island on the hand",
+    "legs swapped", "hard weights", "mild noise", "sums", "no weights", "weight not a number",
+    "bind rotated by 30 degrees", "bind singular", "bone without length", "knee outside",
+    "asymmetric elbow", "side names swapped", "name twice", "spikes of 3 cm", "triangles flipped",
+    "normals zero", "triangles without area", "pop of 50 degrees", "12 frozen frames", "skate",
+    "sunk clip", "teleport", "jitter of 4 degrees", "elbow hyperextended",
+}  # fmt: skip
+
+
+def course_faults(who: Course, r: Roles, rng: np.random.Generator) -> Iterator[Fault]:
+    """Faults of ``.skel``, ``.skin`` and ``.anim`` files."""
+    yield from (fault for fault in faults_of(who, r, rng) if fault.name in COURSE)
+    elbow, knee = who[r.elbow], who[r.knee]
+    turns = np.unwrap(euler_angles(who.rotations), axis=0)
+    low, high = turns.min(axis=0), turns.max(axis=0)
+
+    def edited(*edits):
+        return changed("edits", edits)
+
+    def limited(joint, axis, lowest, highest):
+        return changed("limits", {(joint, axis): (lowest, highest)})
+
+    def posed(one):
+        one.limits, one.pose = {(knee, 0): (-0.5, 0.5)}, {knee: (1.5, 0.0, 0.0)}
+
+    def of_joint(number):
+        def change(one):
+            one.weights[0] = np.eye(n_joints)[0]
+            one.edits = ((".skin", f"{weights}1 0 1\n", f"{weights}1 {number} 1\n"),)
+
+        return change
+
+    n_vertices, n_joints, section = len(who.points), len(who.names), "skinweights"
+    channels = f"numchannels {3 + 3 * n_joints}"
+    first = f"triangles {len(who.triangles)} {{\n"
+    a, b, c = who.triangles[0].tolist()
+    corners, weights = f"{first}{a} {b} {c}\n", f"{section} {n_vertices} {{\n"
+    bindings = f"bindings {n_joints} {{\n"
+    axis = int(np.ptp(turns[:, knee], axis=0).argmax())
+    middle = 0.5 * (low + high)[knee, axis]
+    yield Fault("limits reversed", "S003", [
+        limited(knee, 0, 0.5, -2.5), limited(elbow, 2, 1.0, 0.0)])  # fmt: skip
+    yield Fault("limits too small", "C006", [
+        limited(knee, axis, low[knee, axis], middle),
+        limited(knee, axis, middle, high[knee, axis])])  # fmt: skip
+    yield Fault("limits in degrees", "S003 S005 S014", [limited(knee, 0, -10.0, 140.0)])
+    yield Fault("pose outside limits", "S004", [posed])
+    yield Fault("brace missing", "F002", [edited((".skel", "{\n", "\n")),
+                                          edited((".skin", corners, f"{first}}}\n")),
+                                          edited((".anim", "channel {", "channel"))])  # fmt: skip
+    yield Fault("vertex of a triangle missing", "F002 M014 F007", [
+        edited((".skin", corners, f"{first}{n_vertices} {b} {c}\n")),
+        edited((".skin", corners, f"{first}-1 {b} {c}\n"))])  # fmt: skip
+    yield Fault("triangle twice", "M011", [
+        lambda one: one.triangles.__setitem__(1, one.triangles[0])])  # fmt: skip
+    yield Fault("joint of a weight missing", "W010", [of_joint(n_joints), of_joint(-1)])
+    yield Fault("count too large", "F002", [
+        edited((".skin", f"positions {n_vertices}", f"positions {n_vertices + 1}")),
+        edited((".skin", f"{section} {n_vertices}", f"{section} {n_vertices + 1}"))])  # fmt: skip
+    yield Fault("fewer normals than positions", "F002 M015", [
+        lambda one: setattr(one, "normals", one.normals[:-1])])  # fmt: skip
+    yield Fault("too few bindings", "B001", [
+        edited((".skin", bindings, f"bindings {n_joints - 1} {{\n"))])  # fmt: skip
+    yield Fault("missing channels", "C009", [changed("n_missing", 3), changed("n_missing", 60)])
+    yield Fault("wrong number of channels", "F002", [
+        edited((".anim", channels, "numchannels 9"))])  # fmt: skip
+    key, swapped = f"{who.step:.6f} ", f"{3.5 * who.step:.6f} "
+    yield Fault("keys out of order", "C001", [edited((".anim", key, swapped))])
+    yield Fault("two keys at one time", "C002", [edited((".anim", key, f"{2 * who.step:.6f} "))])
+    yield Fault("range reversed", "F002 C010", [
+        edited((".anim", "range 0", "range 9"))])  # fmt: skip
+    yield Fault("key not a number", "F003", [edited((".anim", f"{key}", f"{key}nan linear linear\n"
+                                                    f"{1.1 * who.step:.6f} "))])  # fmt: skip
+    yield Fault("keys in degrees", "C004", [changed("per_radian", 180.0 / np.pi)])
 
 
 def main(*wanted: str) -> None:
@@ -561,6 +649,8 @@ def main(*wanted: str) -> None:
             who = standing(who)
             faults = [*bvh_faults(who, HUMANS[name], np.random.default_rng(7))]
             table_of(f"{name} as BVH", who, faults, bvh)
+            faults = [*course_faults(who, HUMANS[name], np.random.default_rng(7))]
+            table_of(f"{name} in files of the course", Course(**vars(who)), faults, write_course)
         print(f"  {time.process_time() - started:.0f} s of processor time\n")
 
 

@@ -4,6 +4,7 @@ are: valid or not. The writer of ``.glb`` shares nothing with the program's.
 
 import json
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from viewer.linting import Subject
 from viewer.linting._subject import track_of
 from viewer.loading import MotionSettings
 from viewer.rigs.geometry.topology import welded
+from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import rest_pose
@@ -111,6 +113,10 @@ def character(*files, animation="", tile=1, up="") -> Character:
         track.rotations[rows].copy(),
         track.translations[rows] + figure.skeleton.rest_translations,
     )
+    # A body's translation is not one of its root.
+    to_figure = np.linalg.inv(actor.placement)
+    for root in np.flatnonzero(figure.skeleton.parents < 0):
+        offsets[:, root] = apply_transform(to_figure, track.positions[rows, root])
     if tile > 1:
         last = offsets[-1, 0] - offsets[0, 0]
         carried = np.where(np.abs(last) > 0.02 * track.size, last, 0.0)
@@ -166,6 +172,16 @@ def matrices(q) -> np.ndarray:
         vector = np.broadcast_to([*axis, 0.0], q.shape)
         columns.append(product(product(q, vector), inverse)[..., :3])
     return np.stack(columns, axis=-1)
+
+
+def euler_angles(q) -> np.ndarray:
+    """Return angles about x, y and z of rotations R = Rz Ry Rx: (..., 3), radians."""
+    turns = matrices(q)
+    # The first column is (cos y cos z, cos y sin z, -sin y).
+    y = np.arcsin(np.clip(-turns[..., 2, 0], -1.0, 1.0))
+    z = np.arctan2(turns[..., 1, 0], turns[..., 0, 0])
+    x = np.arctan2(turns[..., 2, 1], turns[..., 2, 2])
+    return np.stack([x, y, z], axis=-1)
 
 
 def write_glb(one: Character, path: Path, standing: np.ndarray | None = None) -> Path:
@@ -283,12 +299,8 @@ def write_bvh(one: Character, path: Path) -> Path:
 
     joint(int(np.flatnonzero(one.parents < 0)[0]), 0)
     lines += ["MOTION", f"Frames: {one.n_frames}", f"Frame Time: {one.step:.8f}"]
-    turns = matrices(one.rotations)
-    # R = Rz Ry Rx: its first column is (cos y cos z, cos y sin z, -sin y).
-    y = np.arcsin(np.clip(-turns[..., 2, 0], -1.0, 1.0))
-    z = np.arctan2(turns[..., 1, 0], turns[..., 0, 0])
-    x = np.arctan2(turns[..., 2, 1], turns[..., 2, 2])
-    rows = np.concatenate([one.offsets, np.degrees(np.stack([z, y, x], axis=-1))], axis=-1)
+    turns = np.degrees(euler_angles(one.rotations))[..., ::-1]
+    rows = np.concatenate([one.offsets, turns], axis=-1)
     for row in rows[:, order].reshape(one.n_frames, -1):
         lines.append(" ".join(f"{value:.6f}" for value in row))
     path.write_text("\n".join(lines) + "\n")
@@ -308,3 +320,87 @@ def islands(one: Character) -> np.ndarray:
         if (new == label).all():
             return label[place]
         label = new
+
+
+@dataclass
+class Course(Character):
+    """A character in the format of CSE 169, whose texts can also be edited."""
+
+    limits: dict[tuple[int, int], tuple[float, float]] = field(default_factory=dict)
+    """Lower and upper, radians, by joint and axis."""
+    pose: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    """Radians, by joint."""
+    per_radian: float = 1.0
+    """Factor of the rotations of the clip."""
+    n_missing: int = 0
+    """Number of last channels that are not written."""
+    edits: tuple[tuple[str, str, str], ...] = ()
+    """Suffix of the file, the text that is replaced once, and what replaces it."""
+
+
+def write_course(one: Course, folder: Path) -> list[Path]:
+    """Write ``.skel``, ``.skin`` and ``.anim`` files; only the root has translations."""
+    order: list[int] = []
+    skeleton: list[str] = []
+
+    def joint(j: int) -> None:
+        order.append(j)
+        skeleton.append(f"balljoint {one.names[j]} {{\noffset {_numbers(one.rest[j])}")
+        for axis, letter in enumerate("xyz"):
+            if (j, axis) in one.limits:
+                skeleton.append(f"rot{letter}limit {_numbers(one.limits[j, axis])}")
+        if j in one.pose:
+            skeleton.append(f"pose {_numbers(one.pose[j])}")
+        for child in np.flatnonzero(one.parents == j).tolist():
+            joint(child)
+        skeleton.append("}")
+
+    root = int(np.flatnonzero(one.parents < 0)[0])
+    joint(root)
+    place = np.argsort(order)
+    rows = [
+        f"{len(used)} " + " ".join(f"{place[j]} {row[j]:.6g}" for j in used)
+        for row in one.weights
+        for used in [np.flatnonzero(row != 0.0)]
+    ]
+    bindings = [
+        "matrix {\n" + "\n".join(_numbers(row) for row in world.T[:, :3]) + "\n}"
+        for world in np.linalg.pinv(one.binds[order])
+    ]
+    skin = [
+        _section("positions", map(_numbers, one.points)),
+        _section("normals", map(_numbers, one.normals)),
+        _section("skinweights", rows),
+        _section("triangles", (" ".join(map(str, row)) for row in one.triangles.tolist())),
+        _section("bindings", bindings),
+    ]
+    turns = one.per_radian * np.unwrap(euler_angles(one.rotations[:, order]), axis=0)
+    moves = one.offsets[:, root] - one.rest[root]
+    values = np.concatenate([moves, turns.reshape(one.n_frames, -1)], axis=1)
+    values = values[:, : values.shape[1] - one.n_missing]
+    times = np.arange(one.n_frames) * one.step
+    motion = [f"animation {{\nrange 0 {times[-1]:.6f}\nnumchannels {values.shape[1]}"]
+    for curve in values.T:
+        keys = (f"{t:.6f} {x:.6f} linear linear" for t, x in zip(times, curve, strict=True))
+        motion.append(f"channel {{\nextrapolate constant constant\n{_section('keys', keys)}\n}}")
+    texts = {".skel": skeleton, ".skin": skin, ".anim": [*motion, "}"]}
+    paths = []
+    for suffix, lines in texts.items():
+        text = "\n".join(lines) + "\n"
+        for where, old, new in one.edits:
+            if where == suffix:
+                if old not in text:
+                    raise ValueError(f"no {old!r} in {suffix}")
+                text = text.replace(old, new, 1)
+        paths.append(folder / f"one{suffix}")
+        paths[-1].write_text(text)
+    return paths
+
+
+def _section(name: str, rows: Iterable[str]) -> str:
+    lines = [*rows]
+    return "\n".join([f"{name} {len(lines)} {{", *lines, "}"])
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.8g}" for value in values)
