@@ -406,18 +406,22 @@ def test_twist_loses_half_of_what_moves_with_equal_weights():
     assert "left_wrist 50 %" in found.message
 
 
-def test_animal_on_its_back_is_upside_down():
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize(("flip", "expected"), [(1.0, []), (-1.0, ["S013"])])
+def test_animal_on_its_back_is_upside_down(flip, expected, up):
     names = ("body", "head", "fore_foot_l", "fore_foot_r")
-    places = np.array([[0.0, 1, 0], [0.0, 1.2, 1], [0.3, 0, 0.5], [-0.3, 0, 0.5]])
-    for flip, expected in ((1.0, []), (-1.0, ["S013"])):
-        joints = places * [1.0, flip, 1.0]
-        binds = np.tile(np.eye(4), (4, 1, 1))
-        binds[:, :3, 3] = -joints
-        offsets = joints - [[0, 0, 0], *[joints[0]] * 3]
-        mesh = make_mesh(joints, [[0, 1, 2], [0, 2, 3]])
-        skin = skin_from_lists([[(k, 1.0)] for k in range(4)], binds)
-        figure = Figure("cat", mesh, make_skeleton(names, [-1, 0, 0, 0], offsets), skin, unit="m")
-        assert [one.code for one in linted(figure, (joint_places,))] == expected
+    joints = np.array([[0.0, 1, 0], [0.0, 1.2, 1], [0.3, 0, 0.5], [-0.3, 0, 0.5]])
+    joints *= [1.0, flip, 1.0]
+    if up == "z":
+        joints = joints @ [[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]
+    binds = np.tile(np.eye(4), (4, 1, 1))
+    binds[:, :3, 3] = -joints
+    skeleton = make_skeleton(names, [-1, 0, 0, 0], joints - [[0, 0, 0], *[joints[0]] * 3])
+    mesh = make_mesh(joints, [[0, 1, 2], [0, 2, 3]])
+    skin = skin_from_lists([[(k, 1.0)] for k in range(4)], binds)
+    found = linted(Figure("cat", mesh, skeleton, skin, up=up, unit="m"), (joint_places,))
+    assert [one.code for one in found] == expected
+    assert all(one.message.endswith(f"along {up}") for one in found)
 
 
 def apart(figure: Figure, vertices: np.ndarray) -> tuple[Figure, np.ndarray]:
