@@ -116,6 +116,7 @@ def test_straight_tube_gets_even_joints_more_if_it_is_longer():
         skeleton = found(pipe([(0, 0, 0), (0, 0, length)], 0.06)).figure.skeleton
         places = np.array([*joints_of(skeleton).values()])
         assert np.abs(places[:, :2]).max() < 0.03
+        assert 0.5 * length - 0.12 < abs(places[0, 2] - 0.5 * length) < 0.5 * length
         gaps = np.abs(np.diff(places[1:, 2]))
         assert gaps.max() < 1.3 * gaps.min()
         counts.append(skeleton.n_joints)

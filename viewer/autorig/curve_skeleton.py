@@ -683,7 +683,9 @@ def _symmetry_of(
 ) -> tuple[_Plane | None, dict[int, int]]:
     """Return the plane of symmetry, None without one, and the pairs of chains."""
     plane, fraction = _plane_of(solid, up, front, symmetry)
-    if plane is None:
+    apart = _CENTRAL * max(float(tree.radii[0]), solid.spacing)
+    if plane is None or abs(float(plane.sides(tree.hubs[0]))) > apart:
+        # A plane across the skeleton, as in the middle of a tube, has its root on one side.
         return None, {}
     size = solid.spacing * max(solid.inside.shape)
     partner = paired_chains(tree, plane, solid.spacing, size)
