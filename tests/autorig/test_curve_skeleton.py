@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.curve_skeleton import find_skeleton
+from viewer.autorig.curve_skeleton import Chain, Tree, _Plane, find_skeleton, paired_chains
 from viewer.autorig.settings import SkeletonSettings
+from viewer.autorig.solid import solid_of
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import export
@@ -73,6 +74,19 @@ def test_pairs_mirror_each_other_and_are_numbered_from_the_front(walker):
     assert joints["leg_1_left"][2] > joints["leg_2_left"][2]
     said = [str(line) for line in walker.lines]
     assert "2 pairs mirrored" in said[0] and said[1].endswith("the front is +z")
+
+
+def test_legs_near_the_plane_of_symmetry_are_pairs():
+    # Of a cow: the level sets that both legs share in the trunk are wider than the legs are apart.
+    shapes = [[(0.0, 0.5, 0), (x, 0.3, 0), (x, 0.0, 0)] for x in (0.1, -0.1)]
+    chains = tuple(
+        Chain(0, -1, np.array(points), 0.15, 0.0, frozenset({tip}))
+        for tip, points in enumerate([*shapes, [(0, 0.5, 0), (0.01, 0.6, 0), (0.01, 1.0, 0)]])
+    )
+    row = np.zeros(1, dtype=np.int32)
+    tree = Tree(np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, np.arange(3))
+    plane = _Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
+    assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
 
 
 def test_left_follows_the_stated_front():

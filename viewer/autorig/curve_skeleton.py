@@ -478,15 +478,15 @@ def paired_chains(tree: Tree, plane: _Plane, spacing: float, size: float) -> dic
     """Return the chain on the other side of each chain that has one, both ways."""
     partner: dict[int, int] = {}
     central = {0}
-    for chain in tree.chains:
-        if chain.end >= 0 and chain.start in central and _is_central(chain, plane, spacing):
+    for number, chain in enumerate(tree.chains):
+        if chain.end >= 0 and chain.start in central and _is_central(tree, number, plane, spacing):
             central.add(chain.end)
     todo = [(central, central)]
     while todo:
         ours, theirs = todo.pop()
         near = {}
         for number, chain in enumerate(tree.chains):
-            is_side = not _is_central(chain, plane, spacing)
+            is_side = not _is_central(tree, number, plane, spacing)
             if number not in partner and is_side and chain.start in ours | theirs:
                 near[number] = _as_limb(chain, plane)
         positive = np.array(
@@ -505,10 +505,17 @@ def paired_chains(tree: Tree, plane: _Plane, spacing: float, size: float) -> dic
     return partner
 
 
-def _is_central(chain: Chain, plane: _Plane, spacing: float) -> bool:
+def _is_central(tree: Tree, number: int, plane: _Plane, spacing: float) -> bool:
+    chain = tree.chains[number]
     points = at_lengths(chain.points, np.linspace(chain.begin, chain.length, _SAMPLES))
     apart = float(np.abs(plane.sides(points)).max())
-    return apart <= _CENTRAL * max(chain.half_width, spacing)
+    if apart > _CENTRAL * max(chain.half_width, spacing):
+        return False
+    # The front legs of a cow are near the plane, but each is the mirror image of the other.
+    end = chain.points[-1]
+    others = [other.points[-1] for other in tree.chains if other is not chain]
+    gaps = np.linalg.norm(np.array(others).reshape(-1, 3) - plane.mirrored(end), axis=1)
+    return bool(2.0 * abs(float(plane.sides(end))) <= gaps.min(initial=np.inf))
 
 
 def _as_limb(chain: Chain, plane: _Plane) -> Limb:
@@ -735,7 +742,7 @@ def _joint_points(
         fractions, bends = _fractions(chain, voxel, factor)
         path = at_lengths(chain.points, np.linspace(chain.begin, chain.length, _SAMPLES))
         if other is None:
-            if plane is not None and _is_central(chain, plane, voxel):
+            if plane is not None and _is_central(tree, number, plane, voxel):
                 path = _on(plane, path)
             found[number] = at_lengths(path, fractions * arc_lengths(path)[-1])
             continue
