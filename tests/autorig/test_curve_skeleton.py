@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from autorig.rigged_shapes import KNEES, TRUNK, beast, mesh_of, pipe, turn, united
 from numpy.testing import assert_allclose
+from scipy.spatial import ConvexHull
 
 import viewer
 from viewer.autorig import curve_skeleton
@@ -23,6 +24,11 @@ def found(shape, facing=None, up=None, **how):
     mesh = mesh_of(*shape)
     sides = AlignmentSettings(up=up, facing=facing)
     return find_skeleton(Figure("shape", mesh), mesh, SkeletonSettings(**how), sides)
+
+
+def half_resolution(monkeypatch):
+    """Use 48 voxels along the longest side, for speed: in shapes that nearly fill their boxes."""
+    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 48))
 
 
 def joints_of(skeleton):
@@ -151,7 +157,24 @@ def test_arm_on_a_base_has_its_root_there_and_joints_at_its_bends():
     assert len(joints) <= 6
 
 
-def test_shapes_without_limbs_get_one_joint_and_a_warning():
+def box(low, high):
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, 8).T
+    return corners, ConvexHull(corners).simplices
+
+
+def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long():
+    seat, back = box((-1, 1, -1), (1, 1.2, 1)), box((-1, 1, -1), (1, 2.6, -0.8))
+    feet = [(x, 0.0, z) for x in (-0.9, 0.9) for z in (-0.9, 0.9)]
+    legs = [box((x - 0.1, y, z - 0.1), (x + 0.1, 1.1, z + 0.1)) for x, y, z in feet]
+    joints = joints_of(found(united(seat, back, *legs)).figure.skeleton)
+    ends = [place for name, place in joints.items() if name.endswith("_end")]
+    for foot in feet:
+        assert min(np.linalg.norm(end - foot) for end in ends) < 0.3
+    assert len(ends) == 4 and joints["root"][1] > 1.0
+
+
+def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):
+    half_resolution(monkeypatch)
     ball = pipe([(0, -0.1, 0), (0, 0.1, 0)], 0.5)
     result = found(ball)
     assert result.figure.skeleton.n_joints == 1

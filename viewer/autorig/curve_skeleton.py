@@ -53,6 +53,7 @@ _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
 # Shortest limb: relative to the half width of its base, to the size, and in voxels. A bump is
 # wider than long.
 _OWN, _SHORTEST, _VOXELS = 1.0, 0.03, 3.0
+_LONG = 3.0  # length of a limb relative to its neck, from which it is one wherever it is
 # A hub's reach relative to the solid's radius there: two branches that touch the same inscribed
 # ball are one.
 _REACH = 1.0
@@ -160,6 +161,11 @@ class _Field:
         """Paths to the tips of limbs, by the index of the tip."""
 
     def _is_limb(self, found: Protrusion) -> bool:
+        if found.neck is not None:
+            # On a plate, as a leg of a table, the base of a later junction is a part of the plate.
+            junction, base = found.neck
+            if found.tip - junction >= _LONG * float(self._widths[list(base)].max()):
+                return True
         width = float(self._widths[list(found.base)].max())
         return found.tip - found.junction >= max(_OWN * width, self._least)
 

@@ -56,6 +56,8 @@ class Protrusion:
     """Distance at which it merges with others."""
     base: tuple[int, ...]
     """Its level sets just above the junction."""
+    neck: tuple[float, tuple[int, ...]] | None
+    """Junction and base where it stayed first; None if it has not yet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +106,7 @@ class LevelSets:
         group = list(range(self.count))
         kept = [[node] for node in range(self.count)]
         meetings: list[tuple[float, list[int]]] = []
-        standing: set[int] = set()
+        necks: dict[int, tuple[float, tuple[int, ...]]] = {}
 
         def root(node: int) -> int:
             while group[node] != node:
@@ -125,9 +127,14 @@ class LevelSets:
                     tip
                     for tip in tips
                     if len(tips) > 1
-                    and stays(Protrusion(float(self._farthest[tip]), junction, base_of[tip]))
+                    and stays(
+                        Protrusion(
+                            float(self._farthest[tip]), junction, base_of[tip], necks.get(tip)
+                        )
+                    )
                 ]
-                standing.update(passed)
+                for tip in passed:
+                    necks.setdefault(tip, (junction, base_of[tip]))
                 others = [tip for tip in passed if tip != tips[-1]]
                 kept[node] = others + tips[-1:]
                 if len({base_of[tip] for tip in kept[node]}) > 1:
@@ -147,7 +154,7 @@ class LevelSets:
         first = np.unique(self.labels[order], return_index=True)[1]
         return Tips(
             order[first].astype(np.int32),
-            np.array([tip in standing for tip in found], dtype=np.bool_),
+            np.array([tip in necks for tip in found], dtype=np.bool_),
             tuple((at, those) for at, those in met if len(those) > 1),
         )
 
