@@ -226,6 +226,7 @@ def test_command_binds_the_mesh_to_the_joints_that_it_finds(tmp_path, capsys):
         (["--auto", "--from", "body"], "--from and --auto: expected one of them, found both"),
         (["--auto", "--method", "robust"], "expected heat or voxel with --auto, found robust"),
         (["--auto", "--no-fit"], "--no-fit: expected a template (--from) to match, found --auto"),
+        (["--auto", "--keep-doubtful"], "--keep-doubtful: expected a template (--from) to match"),
         (["--symmetry", "x"], "--symmetry and --joint-spacing: expected --auto, found none"),
         (["--auto", "--joint-spacing", "0"], "--joint-spacing: expected 0.1 to 10, found 0"),
         (["--auto", "--facing", "y"], "expected a facing perpendicular to the up axis y, found y"),

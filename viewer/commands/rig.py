@@ -561,6 +561,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
         "--joints": own.joints != usual.joints,
         "--no-fit": own.fits != usual.fits,
         "--no-refine": not settings_of(AlignmentSettings, arguments).refines,
+        "--keep-doubtful": own.insists,
     }
     if arguments.auto:
         alignment = settings_of(AlignmentSettings, arguments)
