@@ -6,8 +6,6 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from viewer.commands._frames import Frames
 from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._scene import SceneOptions, add_driving_arguments
@@ -18,10 +16,8 @@ from viewer.loading import MotionSettings, load
 from viewer.models import resolve
 from viewer.phrases import printable
 from viewer.rigs.figure import Figure
-from viewer.rigs.motion.sampled_animation import sample_animation
-from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.sampled_animation import clip_of, sample_animation
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
-from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.scene import Actor, Scene, pose_actors
@@ -143,13 +139,8 @@ def _target(onto: Scene | Actor | str | Path) -> Actor:
 
 def _between(source: Actor, target: Actor, settings: MotionSettings) -> Scene:
     """Return a copy of the target, driven by the frames of another actor."""
-    frames, figure = sample_animation(source), source.figure
-    timing = Timing(
-        frames.frame_rate,
-        np.where(frames.frames.present, np.arange(frames.frames.n_frames), -1).astype(np.int32),
-        start=float(frames.frames.times[0]),
-    )
-    clip = SampledClip(source.title, timing, *frames.frames.arrays)
+    sampled, figure = sample_animation(source), source.figure
+    clip = clip_of(source.title, sampled, start=float(sampled.frames.times[0]))
     bare = Figure(source.title, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
     drive = Drive(
         SkeletonMotion(bare, replace(clip, shape_weights=None)),

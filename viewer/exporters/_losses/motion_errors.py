@@ -40,9 +40,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.clip import SHORTEST, Channel, Clip
 from viewer.rigs.motion.evaluation import Frames, frames_between, frames_of
-from viewer.rigs.motion.sampled_animation import SampledAnimation, frames_at
-from viewer.rigs.motion.sampled_clip import SampledClip
-from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.sampled_animation import SampledAnimation, clip_of, frames_at
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.skinning import Skinning
 
@@ -169,14 +167,8 @@ _Sampler = Callable[[Floats], Frames]
 
 def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
     """Return a note about the error of interpolating between the written frames, if any."""
-    motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
-    # A row of -1 is a missing frame.
-    clip = SampledClip(
-        motion.name,
-        Timing(rate, np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)),
-        *frames.arrays,
-    )
-    first = frames.times[0]
+    rate, first = animation.frame_rate, animation.frames.times[0]
+    clip = clip_of(animation.motion.name, animation)
 
     def written(times: Floats) -> Frames:
         # Rounding could place the first frame before the clip.

@@ -22,9 +22,7 @@ from viewer.rigs.feet.body import body_legs
 from viewer.rigs.feet.contacts import foot_contacts
 from viewer.rigs.feet.legs import legs_of
 from viewer.rigs.geometry.vectors import axis_vector
-from viewer.rigs.motion.sampled_animation import sample_animation
-from viewer.rigs.motion.sampled_clip import SampledClip
-from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.sampled_animation import clip_of, sample_animation
 from viewer.rigs.scene import Actor
 from viewer.rigs.units import METRES
 
@@ -118,15 +116,14 @@ def _foot_skate(ours: Floats, reference: Actor, rate: float, chosen: slice) -> f
     figure, legs = reference.figure, legs_of(reference.figure.require_skeleton())
     if reference.joint_motion is None or not legs:
         return math.nan
-    frames = sample_animation(reference).frames
-    rows = np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)
-    clip = SampledClip(reference.name, Timing(rate, rows), *frames.arrays)
+    sampled = sample_animation(reference)
+    clip = clip_of(reference.name, sampled)
     up = axis_vector(figure.up)
     body = body_legs(figure, clip, legs, up)
     if body is None or body.size <= 0.0:
         return math.nan
     # A frame of the clip is a row of ``ours``. Spans are ranges of present rows.
-    spans = runs_of(frames.present)
+    spans = runs_of(sampled.frames.present)
     contacts = foot_contacts(body.paths(body.worlds(clip)), spans, rate, body.size, up)
     first, stop, _ = chosen.indices(len(ours))
     steps = [np.zeros(0)]

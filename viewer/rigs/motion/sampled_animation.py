@@ -82,6 +82,13 @@ def sample_animation(
     return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base, gender)
 
 
+def clip_of(name: str, animation: SampledAnimation, start: float = 0.0) -> SampledClip:
+    """Return a clip of the frames, which begins at a time in seconds; -1 are missing frames."""
+    frames = animation.frames
+    rows = np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)
+    return SampledClip(name, Timing(animation.frame_rate, rows, start=start), *frames.arrays)
+
+
 def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
     """Sample an animation's motion at times (T,) in seconds, rotated upright if its frames are."""
     found = frames_of(animation.figure, animation.motion, times, animation.base)
