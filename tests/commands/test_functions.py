@@ -216,7 +216,7 @@ def test_rig_binds_a_mesh_to_a_skeleton(tmp_path):
         (lambda: viewer.rig("fox", fit=3), "^fit: expected True or False, found 3"),
         (lambda: viewer.rig("fox", ACT), "^template: expected paths or names, found Actor"),
         (lambda: viewer.rig("fox", skeleton=[]), "^skeleton: expected paths or names, found an em"),
-        (lambda: viewer.rig(ACT, "body", auto=True), "^template and auto: expected one of them"),
+        (lambda: viewer.rig("fox", "body", auto=True), "^template and auto: expected one of them"),
         (lambda: viewer.rig([]), "^rig: expected a scene, an actor or paths, found an empty list"),
         (lambda: viewer.lint(()), "^lint: expected a scene, an actor or paths, found an empty tup"),
         (lambda: viewer.diff("fox", []), "^diff: expected a scene, .* found an empty list"),

@@ -436,7 +436,7 @@ def _check_only_motion(arguments: argparse.Namespace) -> None:
 def _moving_figure(arguments: argparse.Namespace, frames: Frames) -> MovingMesh:
     """Return the vertices of the figure that moves in a scene."""
     motion = settings_of(MotionSettings, arguments, frame_rate=frames.fps)
-    scene = load(*map(resolve, arguments.files), motion=motion)
+    scene = load(*arguments.files, motion=motion)
     print_warnings(scene.diagnostics)
     meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
     moving = [actor for actor in meshes if actor.joint_motion is not None]
@@ -508,7 +508,7 @@ def _length(figure: Figure, length: float) -> str:
 
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
     """Return the mesh to rig."""
-    scene = load(*map(resolve, files))
+    scene = load(*files)
     inputs += scene.files
     print_warnings(scene.diagnostics)
     return _one_mesh(scene)
