@@ -215,11 +215,20 @@ def _keys(state: AppState) -> list[_Unsaved]:
     saved, found = state.of(SavedWork), list[_Unsaved]()
     for row, actor in enumerate(state.scene.actors):
         name, clip = printable(actor.name, _LONGEST), actor.keyed
-        is_read = any(animation.plays(clip) for animation in actor.figure.animations)
+        animations = actor.figure.animations
+        is_read = clip not in saved.edited and any(one.plays(clip) for one in animations)
         if clip is not None and clip not in saved and not is_read:
             text = f"{name}: keys of {printable(clip.name, _LONGEST)}"
             found.append(_Unsaved(text, _for_actor(row, _ask_for_keys)))
-        for index, aside in edited_aside(state.of(Animations), actor).items():
+        if actor.captured in saved.edited and actor.captured not in saved:
+            found.append(_Unsaved(f"{name}: motion", _for_actor(row, _ask_for_keys)))
+        others = {
+            index: motion
+            for index, one in enumerate(animations)
+            for motion in saved.edited
+            if motion is not clip and one.plays(motion)
+        }
+        for index, aside in (others | edited_aside(state.of(Animations), actor)).items():
             if aside not in saved:
                 text = f"{name}: keys of {printable(aside.name, _LONGEST)}"
                 ask = partial(_ask_for_keys, index=index)

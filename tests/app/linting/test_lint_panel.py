@@ -27,8 +27,9 @@ from viewer.rendering.camera import camera_axes
 from viewer.rendering.overlay.annotation import MARK_COLOR
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.animation_choice import play_animation
+from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
 from viewer.rigs.scene import Actor, Scene
 
 PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
@@ -307,6 +308,40 @@ def test_scene_that_changes_while_it_is_fixed_stays_as_it_is(lint):
     assert hand.state.scene.actors[0].figure is other
     said = [note.text for note in hand.state.messages.notes]
     assert "Nothing was fixed: the scene changed meanwhile" in said
+
+
+@pytest.mark.parametrize("played", [None, 0, 1])
+def test_fixed_motion_is_unsaved_until_it_is_undone(lint, played):
+    """A capture, an animation that plays, and one that does not."""
+    bends = waving()
+    bends[30] += 50.0
+    turns = about_z(bends)
+    if played is None:
+        every = np.tile([0.0, 0.0, 0.0, 1.0], (len(K), 6, 1))
+        every[:, 3] = turns
+        clip = SampledClip("pop", Timing(KEY_RATE, K), every, np.zeros((len(K), 6, 3)))
+        scene = Scene([Actor(arm(), clip=clip)])
+    else:
+        last = float(K[-1]) / KEY_RATE
+        pop, still = (
+            TransformClip(name, (TransformChannel(3, "rotation", K / KEY_RATE, values),), 0.0, last)
+            for name, values in (("pop", turns), ("still", about_z(waving())))
+        )
+        animations = [Animation(one.name, 0.0, last, lambda one=one: one) for one in (pop, still)]
+        scene = Scene([Actor(replace(arm(), animations=tuple(animations)))])
+        play_animation(scene.actors[0], played)
+    hand = lint(scene)
+    assert "C020" in codes(hand) and not unsaved_edits(hand.state)
+    hand.click("Fix")
+    hand.state.job.wait()
+    hand.step(3)
+    finish(hand)
+    wanted = "motion" if played is None else "keys of pop"
+    name = scene.actors[0].name
+    assert [edit.text for edit in unsaved_edits(hand.state)] == [f"{name}: {wanted}"]
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert not unsaved_edits(hand.state)
 
 
 def test_captured_points_are_marked(lint):

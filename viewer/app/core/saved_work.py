@@ -11,7 +11,7 @@ from viewer.data_classes import dataclass
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.transform_clip import Animation, TransformClip
 from viewer.rigs.pose import PoseKey
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, Motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +29,8 @@ class SavedWork:
     # Edits replace an object by a new one, and undo restores the old one, so an object that is not
     # recorded contains unsaved edits. Poses are edited in place, so they are recorded by value.
     _objects: list[object] = field(default_factory=list)
-    edited: WeakSet[Figure] = field(default_factory=WeakSet)
-    """Figures whose rig or mesh was edited, saved or not; others have those of their files."""
+    edited: WeakSet[Figure | Motion] = field(default_factory=WeakSet)
+    """Figures whose rig or mesh was edited, and fixed motions, saved or not."""
 
     def add(self, *objects: object) -> None:
         """Record objects whose content is saved."""

@@ -49,7 +49,7 @@ from viewer.rendering.picking import Pick
 from viewer.rendering.recorder import copied
 from viewer.rigs.mesh import box_size
 from viewer.rigs.pose import PoseKey
-from viewer.rigs.scene import Scene, scene_unit
+from viewer.rigs.scene import Actor, Scene, scene_unit
 
 _COLORS = {
     "error": (1.0, 0.42, 0.36, 1.0),
@@ -443,9 +443,8 @@ def _start_fixing(state: AppState) -> None:
             state.say_status("Nothing was fixed: the scene changed meanwhile")
             return
         for actor, fixed in zip(actors, copy.actors, strict=True):
-            if fixed.figure is not actor.figure:
-                state.of(SavedWork).edited.add(fixed.figure)
-                actor.figure = fixed.figure
+            _record_edits(state.of(SavedWork), actor, fixed)
+            actor.figure = fixed.figure
             if fixed.clip is not actor.clip:
                 # Joints whose keys were deleted are at rest.
                 actor.clip, actor.pose = fixed.clip, fixed.pose
@@ -454,6 +453,18 @@ def _start_fixing(state: AppState) -> None:
         state.of(Linting).wants_check = True
 
     state.job = ThreadJob(_FIXING, fix, show)
+
+
+def _record_edits(saved: SavedWork, actor: Actor, fixed: Actor) -> None:
+    """Record what differs in an actor that was fixed: its rig, the motion and its animations."""
+    old, new = actor.figure, fixed.figure
+    if (old.skeleton, old.skin, old.mesh) != (new.skeleton, new.skin, new.mesh):
+        saved.edited.add(new)
+    for before, after in zip(old.animations, new.animations, strict=True):
+        if after is not before:
+            saved.edited.add(after.clip())
+    if fixed.clip is not None and fixed.clip is not actor.clip:
+        saved.edited.add(fixed.clip)
 
 
 def _options(state: AppState) -> LintOptions:
