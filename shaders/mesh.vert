@@ -14,6 +14,7 @@ in vec3 in_model_z;
 in vec3 in_place;              // per instance: posed centre in scene space, as the sum of two
 in vec3 in_place_rest;         // floats, since differences of large coordinates must be exact
 in vec3 in_actor_color;        // per instance: linear
+in float in_actor_opacity;     // per instance
 uniform vec3 u_eye;            // point of scene space at the camera's origin, as the sum of two
 uniform vec3 u_eye_rest;       // floats
 uniform mat3 u_view;           // linear part of the matrix from scene to camera space
@@ -59,11 +60,13 @@ void main() {
     v_normal = inverse_transposed(model_view[0], model_view[1], model_view[2], normal, 0.0);
     v_scalar = 0.0;
     vec3 color = in_actor_color;
+    v_opacity = in_actor_opacity;
 #else
     v_position = (u_model_view * vec4(in_position, 1.0)).xyz;
     v_normal = u_normal_matrix * in_normal;
     v_scalar = in_scalar;
     vec3 color = u_color;
+    v_opacity = 1.0;
 #endif
     v_uv = in_uv;
 #ifdef MATERIALS
@@ -71,7 +74,6 @@ void main() {
     v_tint = in_tint;
 #endif
     v_color = u_has_colors ? in_color : color;
-    v_opacity = 1.0;
     v_instance = gl_InstanceID;
     gl_Position = u_projection * vec4(v_position, 1.0);
 }

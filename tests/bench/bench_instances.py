@@ -148,7 +148,7 @@ def still_draw(
     content: list[Any] = [
         (mesh.positions, "3f4", "in_position"),
         (mesh.normals, "3f4", "in_normal"),
-        (instances._instances, "3f4 3f4 3f4 3f4 12x 3f4/i", *names),
+        (instances._instances, "3f4 3f4 3f4 3f4 12x 3f4 4x/i", *names),
     ]
     for values, layout, name in ((mesh.uvs, "2f4", "in_uv"), (mesh.colors, "3f4", "in_color")):
         if name in program and values is not None:

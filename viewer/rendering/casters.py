@@ -66,8 +66,9 @@ class Casters:
             placement = placement_of(actor, options)
             self.mesh_pass.draw_shape(mesh, placement, view, options, fragment, self._prepare)
         for _, instances in self.meshes.instanced:
-            how = view, options, fragment, self._prepare
-            draw_instance_shapes(self.programs, instances, *how)
+            if count := instances.count_above(self.threshold):
+                how = view, options, fragment, self._prepare
+                draw_instance_shapes(self.programs, instances, *how, count)
         # Over a skin, a skeleton is an overlay and casts no shadow.
         for group in self.lineup.joint_groups:
             skeleton = self.buffers.joint_group(group)

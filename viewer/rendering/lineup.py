@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ _SAME = 1e-6  # largest relative difference of equal scales
 
 Rows = NDArray[np.intp]
 
+CrowdKey: TypeAlias = tuple[int, bytes, bool]
+"""What the actors of a crowd share: figure, shape, and whether they are translucent."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
@@ -32,13 +36,16 @@ class Group:
 
     crowd: Crowd
     rows: Rows
-    """Ascending."""
+    """By falling opacity, those of equal opacity ascending."""
     actors: list[Actor]
     """The same actors."""
 
 
 class Crowd:
-    """Skinned actors of one figure and shape as arrays, and a version of each actor's pose."""
+    """Skinned actors of one figure and shape as arrays, and a version of each actor's pose.
+
+    Either all actors are opaque, or all are translucent, with any opacities.
+    """
 
     # Poses and placements are arrays that anyone may change in place, so ``update`` gathers and
     # compares their numbers. All that follows from them is computed if a version has grown.
@@ -48,12 +55,15 @@ class Crowd:
         self.shape_weights: Floats = actors[0].require_pose().shape_weights.copy()
         self.poses: list[Pose] = []
         """The poses of the actors, set again when an actor gets another one."""
+        self.opacities: Floats = np.ones(len(actors))
+        """The opacities of the actors, set again when one of them changes."""
         self.versions: NDArray[np.int64] = np.zeros(len(actors), np.int64)
-        self.version = self.placement_version = self._side_version = 0
+        self.version = self.placement_version = self._order_version = 0
         self.models: Floats = np.zeros((0, 4, 4))
         self.colors: list[Color | None] = []
         self._table = PoseTable()
         self._placed: tuple[Floats, Floats, list[float]] = np.zeros(0), np.zeros(0), []
+        self._placed_opacities: Floats = np.zeros(0)
         self._reflected: Bools = np.zeros(0, dtype=np.bool_)
         self._key: tuple[object, ...] = ()
         self._groups: list[Group] = []
@@ -63,6 +73,11 @@ class Crowd:
         """The values of all poses at the last update."""
         assert self._table.arrays is not None  # just updated
         return self._table.arrays
+
+    @property
+    def is_translucent(self) -> bool:
+        """Whether the actors are translucent."""
+        return bool(self.opacities[0] < 1.0)
 
     def update(self) -> None:
         """Gather the values of all actors, and raise the versions of what changed."""
@@ -79,14 +94,17 @@ class Crowd:
         colors = [actor.color for actor in self.actors]
         old = self._placed
         is_turned = scales != old[2] or not np.array_equal(places, old[0])
-        if not is_turned and colors == self.colors and np.array_equal(shifts, old[1]):
+        is_faded = not np.array_equal(self.opacities, self._placed_opacities)
+        is_same = colors == self.colors and np.array_equal(shifts, old[1])
+        if is_same and not (is_turned or is_faded):
             return
         self.models, self.colors = places.reshape(-1, 4, 4) @ placements(poses), colors
         if is_turned:
             reflected = np.linalg.det(self.models[:, :3, :3]) < 0.0
-            self._side_version += not np.array_equal(reflected, self._reflected)
+            self._order_version += not np.array_equal(reflected, self._reflected)
             self._reflected = reflected
-        self._placed = places, shifts, scales
+        self._order_version += is_faded
+        self._placed, self._placed_opacities = (places, shifts, scales), self.opacities
         self.placement_version += 1
 
     def joint_groups(self) -> list[Group]:
@@ -116,7 +134,7 @@ class Crowd:
 
         ``is_culled``: whether back faces of a material are not drawn.
         """
-        key = FEWEST, most, is_culled, self._side_version, is_culled and self.version
+        key = FEWEST, most, is_culled, self._order_version, is_culled and self.version
         if key != self._key:
             # Triangles of actors that are reflected are clockwise seen from their front.
             sides = [np.flatnonzero(self._reflected == side) for side in (False, True)]
@@ -125,6 +143,8 @@ class Crowd:
                 # alone.
                 plain = np.asarray((self.arrays.scales >= 0.0).all(axis=(1, 2)))
                 sides = [rows[plain[rows]] for rows in sides]
+            # The actors that are opaque enough to cast a shadow are then the first of a group.
+            sides = [rows[np.argsort(-self.opacities[rows], kind="stable")] for rows in sides]
             found = [
                 rows[start : start + most]
                 for rows in sides
@@ -142,9 +162,9 @@ class Lineup:
 
     key: tuple[object, ...] = ()
     """All that decides about the other fields; see ``lineup``."""
-    crowds: dict[tuple[int, bytes], Crowd] = field(default_factory=dict)
-    """Actors whose meshes may be drawn together, by figure and shape."""
-    joint_crowds: dict[tuple[int, bytes], Crowd] = field(default_factory=dict)
+    crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
+    """Actors whose meshes may be drawn together."""
+    joint_crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
     """Actors of which only the joints are drawn, which may be drawn together."""
     drawn: list[Actor] = field(default_factory=list)
     """All drawn actors."""
@@ -225,48 +245,51 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
 
 
 def _crowds(
-    actors: Sequence[Actor], options: DisplayOptions, before: dict[tuple[int, bytes], Crowd]
-) -> dict[tuple[int, bytes], Crowd]:
+    actors: Sequence[Actor], options: DisplayOptions, before: dict[CrowdKey, Crowd]
+) -> dict[CrowdKey, Crowd]:
     """Return crowds of at least ``FEWEST`` drawn actors, those of before with the same actors."""
-    # Translucent actors, actors with hidden parts, outlines or changed materials are drawn one by
-    # one, and so is everything in views that draw lines or values of single vertices.
+    # Actors with hidden parts, outlines or changed materials are drawn one by one, and so is
+    # everything in views that draw lines or values of single vertices.
     if options.show in ("binding", "skeleton") or options.shading == "scalar":
         return {}
     if options.wireframe or options.normals:
         return {}
     kinds: dict[int, tuple[bool, bool]] = {}
-    groups: dict[tuple[int, bytes], list[Actor]] = {}
+    groups: dict[CrowdKey, list[Actor]] = {}
     for actor in actors:
         pose, figure = actor.pose, actor.figure
-        if pose is None or actor.hidden_parts or options.opacity * actor.opacity != 1.0:
+        if pose is None or actor.hidden_parts:
             continue
         if id(figure) not in kinds:
             kinds[id(figure)] = _kind_of(figure)
         is_plain, has_binds = kinds[id(figure)]
         if is_plain and not (has_binds and pose.shape_weights.any()):
-            groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
-    return _large(groups, before)
+            is_translucent = options.opacity * actor.opacity < 1.0
+            key = id(figure), pose.shape_weights.tobytes(), is_translucent
+            groups.setdefault(key, []).append(actor)
+    return _large(groups, options, before)
 
 
 def _joint_crowds(
-    actors: Sequence[Actor], options: DisplayOptions, before: dict[tuple[int, bytes], Crowd]
-) -> dict[tuple[int, bytes], Crowd]:
+    actors: Sequence[Actor], options: DisplayOptions, before: dict[CrowdKey, Crowd]
+) -> dict[CrowdKey, Crowd]:
     """Return crowds of opaque actors of which only the joints are drawn."""
     if options.show == "binding":
         return {}
-    groups: dict[tuple[int, bytes], list[Actor]] = {}
+    groups: dict[CrowdKey, list[Actor]] = {}
     for actor in with_skeleton(actors, options):
         pose, figure = actor.pose, actor.figure
         if pose is None or shows_mesh(figure, options) or options.opacity * actor.opacity != 1.0:
             continue
         if figure.require_skeleton().n_joints <= _MOST_JOINTS:
-            groups.setdefault((id(figure), pose.shape_weights.tobytes()), []).append(actor)
-    return _large(groups, before)
+            key = id(figure), pose.shape_weights.tobytes(), False
+            groups.setdefault(key, []).append(actor)
+    return _large(groups, options, before)
 
 
 def _large(
-    groups: dict[tuple[int, bytes], list[Actor]], before: dict[tuple[int, bytes], Crowd]
-) -> dict[tuple[int, bytes], Crowd]:
+    groups: dict[CrowdKey, list[Actor]], options: DisplayOptions, before: dict[CrowdKey, Crowd]
+) -> dict[CrowdKey, Crowd]:
     """Return crowds of the groups with at least ``FEWEST`` actors, known ones if possible."""
     found = {}
     for key, group in groups.items():
@@ -275,6 +298,7 @@ def _large(
             is_known = known is not None and known.actors == group
             crowd = found[key] = known if known is not None and is_known else Crowd(group)
             crowd.poses = [actor.require_pose() for actor in group]
+            crowd.opacities = np.array([options.opacity * actor.opacity for actor in group])
     return found
 
 

@@ -161,7 +161,7 @@ class PickPass:
             self._number(program, found)
 
         how = view, options, "pick", prepare
-        draw_instance_shapes(self._programs, instances, *how)
+        draw_instance_shapes(self._programs, instances, *how, instances.count)
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self._buffers.skeleton(actor)

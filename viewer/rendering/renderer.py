@@ -149,9 +149,10 @@ class Renderer:
             self.late.backdrop_pass.draw(view, options.lights)
         draw_image_behind(self.late, scene, view, options, target.size)
         self.late.use_pictures(meshes.uploaded, options)
-        draw = partial(self._draw_layer, meshes, view, options, blended=False)
+        opaque = meshes.opaque(options)
+        draw = partial(self._draw_layer, opaque, view, options, blended=False)
         draw_layer(self.context, options, draw)
-        for actor, mesh in meshes.opaque(options):
+        for actor, mesh in opaque.singles:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
         draw_image_planes(self.late, scene, view, options, box)
         index = selected[0]
@@ -168,10 +169,10 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
-        self._draw_translucent(meshes, view, options)
-        if any(mesh.is_blended for mesh in meshes.uploaded):
+        self._draw_translucent(meshes.translucent(options), view, options)
+        if any(mesh.is_blended for mesh in opaque.uploaded):
             with without_depth_writes(self.context):
-                self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
+                self._draw_layer(far_first(opaque, options, view), view, options, blended=True)
         for actor in lineup.points:
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
@@ -295,32 +296,26 @@ class Renderer:
     def _draw_translucent(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         """Draw translucent actors over everything opaque, as a single layer."""
         # Where they overlap, only the nearest surface is visible, so the poses of a motion stay
-        # legible.
-        drawn = [
-            (actor, mesh, opacity)
-            for actor, mesh in meshes.singles
-            if 0.0 < (opacity := options.opacity * actor.opacity) < 1.0
-        ]
-        if not drawn:
+        # legible. Depth decides what that is, so they need no order.
+        if not meshes:
             return
 
         def draw() -> None:
-            for actor, mesh, opacity in drawn:
-                place = placement_of(actor, options)
-                for blended in (False, True)[: 1 + mesh.mesh.is_blended]:
-                    self.mesh_pass.draw(mesh, place, view, options, actor.color, blended, opacity)
+            for blended in (False, True):
+                self._draw_layer(meshes, view, options, blended)
 
         draw_nearest(self.context, draw)
-        for actor, mesh, opacity in drawn:
-            self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options, opacity)
+        for actor, mesh in meshes.singles:
+            place, opacity = placement_of(actor, options), options.opacity * actor.opacity
+            self.mesh_pass.draw_lines(mesh, place, view, options, opacity)
 
     def _draw_layer(
         self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool
     ) -> None:
-        for actor, mesh in meshes.opaque(options):
+        for actor, mesh in meshes.singles:
             if mesh.mesh.is_blended or not blended:
-                placement = placement_of(actor, options)
-                self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
+                placement, opacity = placement_of(actor, options), options.opacity * actor.opacity
+                self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended, opacity)
         for _, instances in meshes.instanced:
             if instances.mesh.is_blended or not blended:
                 draw_instances(self.programs, instances, view, options, blended)

@@ -35,9 +35,19 @@ class Meshes:
         singles = [mesh.mesh for _, mesh in self.singles]
         return singles + [instances.mesh for _, instances in self.instanced]
 
-    def opaque(self, options: DisplayOptions) -> list[tuple[Actor, PosedMesh]]:
-        """Return the opaque meshes that are drawn individually."""
-        return [one for one in self.singles if options.opacity * one[0].opacity == 1.0]
+    def opaque(self, options: DisplayOptions) -> Meshes:
+        """Return the opaque meshes."""
+        return Meshes(
+            [one for one in self.singles if options.opacity * one[0].opacity == 1.0],
+            [one for one in self.instanced if not one[0].crowd.is_translucent],
+        )
+
+    def translucent(self, options: DisplayOptions) -> Meshes:
+        """Return the translucent meshes, without those of opacity 0 that are drawn individually."""
+        return Meshes(
+            [one for one in self.singles if 0.0 < options.opacity * one[0].opacity < 1.0],
+            [one for one in self.instanced if one[0].crowd.is_translucent],
+        )
 
 
 def prepare_meshes(buffers: ActorBuffers, lineup: Lineup, options: DisplayOptions) -> Meshes:

@@ -239,6 +239,48 @@ def test_instances_look_like_their_actors_drawn_one_by_one(offscreen, monkeypatc
     assert (difference > 2).mean() < 0.001
 
 
+@pytest.mark.parametrize(
+    ("changes", "alpha_mode"),
+    [({"quality": "normal"}, "opaque"), ({"opacity": 0.7, "xray": True}, "blend")],
+    ids=str,
+)
+def test_translucent_instances_look_like_their_actors_drawn_one_by_one(
+    offscreen, monkeypatch, changes, alpha_mode
+):
+    material = replace(checker(8), alpha_mode=alpha_mode, base_color=(1.0, 0.8, 0.6, 0.9))
+    figure, scene, size = arm(3, material=material), rows_of_arms(FEWEST + 2), (80, 60)
+    # Some overlap, one is opaque, one invisible, and only some are opaque enough for a shadow.
+    for number, actor in enumerate(scene.actors):
+        actor.figure, actor.opacity = figure, 0.1 * (number * 7 % 10) if number else 1.0
+        actor.placement[0, 3], actor.placement[1, 3] = 0.3 * number, 0.3 * number
+    options = DisplayOptions(**changes)
+    camera, box = default_camera(scene, size), scene_box(scene)
+    translucent = scene.actors if options.opacity < 1.0 else scene.actors[1:]
+    falling = sorted(translucent, key=lambda actor: -actor.opacity)
+    assert groups_of(scene.actors, options) == [falling]
+    together = offscreen.render(scene, size, camera, options, box)
+    monkeypatch.setattr(lineup, "FEWEST", 100)
+    assert groups_of(scene.actors, options) == []
+    alone = offscreen.render(scene, size, camera, options, box)
+    difference = np.abs(together.astype(int) - alone).max(axis=-1)
+    assert (difference > 2).mean() < 0.001
+
+
+def test_opacities_of_a_crowd_change_without_skinning(offscreen, work):
+    scene, size, options = crowd(FEWEST), (64, 48), DisplayOptions(quality="normal", grid=False)
+    camera, box = default_camera(scene, size), scene_box(scene)
+    pictures = []
+    for opacity in (0.4, 0.8, 0.4):
+        work.clear()
+        for number, actor in enumerate(scene.actors):
+            actor.opacity = opacity - 0.01 * number
+        pictures.append(offscreen.render(scene, size, camera, options, box))
+        assert work["transform"] == (0 if pictures[1:] else FEWEST)
+        assert work["write"] >= 19 * 4 * FEWEST
+    np.testing.assert_array_equal(pictures[0], pictures[2])
+    assert (pictures[0] != pictures[1]).any()
+
+
 def test_only_actors_of_one_figure_and_shape_are_drawn_together():
     body = viewer.load(bundled_body()).actors[0].figure
     fox = viewer.load().actors[0].figure
@@ -435,10 +477,11 @@ def crowd(count: int) -> Scene:
     return Scene(actors)
 
 
-@pytest.mark.parametrize("quality", ["draft", "normal"])
-def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, quality):
-    size, options, draws = (64, 48), DisplayOptions(quality=quality), {}
-    for count in (10, 250):
+@pytest.mark.parametrize(("quality", "opacity"), [("draft", 1.0), ("normal", 1.0), ("draft", 0.6)])
+def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, quality, opacity):
+    size, draws = (64, 48), {}
+    options = DisplayOptions(quality=quality, opacity=opacity)
+    for count in (10, 100):
         scene = crowd(count)
         box, camera = scene_box(scene), default_camera(scene, size)
         for _ in range(3):  # the second image of a size stores its background
@@ -447,7 +490,7 @@ def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, qu
             offscreen.render(scene, size, camera, options, box)
         assert work["transform"] == work["write"] == 0
         draws[count] = work["render"]
-    assert draws[10] == draws[250]
+    assert draws[10] == draws[100]
 
 
 def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
@@ -465,11 +508,11 @@ def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
     done = draw("normal")  # once for all passes
     assert done["transform"] == 3
     # Of each, 3 matrices and its centres, three rows of four floats each; then the placements and
-    # colours of all actors, 18 floats each, as posed centres are part of the placements.
-    assert done["write"] == 3 * 4 * 48 + 100 * 18 * 4
+    # colours of all actors, 19 floats each, as posed centres are part of the placements.
+    assert done["write"] == 3 * 4 * 48 + 100 * 19 * 4
     scene.actors[7].placement[0, 3] += 0.5
     done = draw("normal")
-    assert (done.get("transform", 0), done["write"]) == (0, 100 * 18 * 4)
+    assert (done.get("transform", 0), done["write"]) == (0, 100 * 19 * 4)
     assert draw("final").get("write", 0) == 0
 
 

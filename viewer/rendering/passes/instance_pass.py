@@ -52,6 +52,7 @@ _PER_INSTANCE = {
     "in_place": 3,
     "in_place_rest": 3,
     "in_actor_color": 3,
+    "in_actor_opacity": 1,
 }
 _FLOATS = sum(_PER_INSTANCE.values())
 _LAYOUT = " ".join(f"{count}f4" for count in _PER_INSTANCE.values())
@@ -90,19 +91,20 @@ def draw_instance_shapes(
     options: DisplayOptions,
     fragment: str,
     prepare: Prepare,
+    count: int,
 ) -> None:
-    """Draw instanced surfaces with a fragment shader that shows no colours."""
+    """Draw the first ``count`` instances with a fragment shader that shows no colours."""
     materials = instances.mesh.has_materials
     program = programs.drawing("mesh", fragment=fragment, materials=materials, instanced=True)
     instances.use(program, view)
     set_uniforms(program, {"u_has_tint": has_tints(instances.mesh, options)})
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
     array, mirrored = instances.array(program, indices), instances.is_mirrored
-    draw_shapes(array, indices, options, fragment, prepare, instances.count, mirrored)
+    draw_shapes(array, indices, options, fragment, prepare, count, mirrored)
 
 
 class InstanceBuffers:
-    """Posed vertices, placements and colours of actors that share a figure and a shape.
+    """Posed vertices, placements, colours and opacities of actors of one figure and shape.
 
     Either all placements reflect, ``is_mirrored``, or none does.
     """
@@ -163,7 +165,7 @@ class InstanceBuffers:
         self._figure = figure
 
     def _place(self) -> None:
-        """Upload the actors' placements, which include the posed centres, and their colours."""
+        """Upload the placements, which include the posed centres, the colours and opacities."""
         crowd, rows = self._group.crowd, self._group.rows
         models = crowd.models[rows]
         colors = np.array([crowd.colors[row] or SKIN_COLOR for row in rows.tolist()])
@@ -171,7 +173,8 @@ class InstanceBuffers:
         self.is_mirrored = bool(np.linalg.det(linear[0]) < 0.0)
         centers = self.vertices.centers[: self.count]
         places = models[:, :3, 3] + (linear @ centers[..., None])[..., 0]
-        parts = [linear.reshape(-1, 9), *_two_floats(places), colors]
+        opacities = crowd.opacities[rows, None]
+        parts = [linear.reshape(-1, 9), *_two_floats(places), colors, opacities]
         data = float32(np.concatenate(parts, axis=1))
         if self._instances is None or self._instances.size < data.nbytes:
             self._arrays.release()
@@ -181,6 +184,10 @@ class InstanceBuffers:
             self._instances = reserved(self.context, 3 * data.nbytes // 2, "instances")
         self._instances.write(data)
         self._models, self._bounds = models, None
+
+    def count_above(self, opacity: float) -> int:
+        """Return the number of actors of more than an opacity; they come first."""
+        return int((self._group.crowd.opacities[self._group.rows] > opacity).sum())
 
     def bounds(self) -> Bounds:
         """Return the bounds of the vertices in scene space."""
