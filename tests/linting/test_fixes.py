@@ -1,5 +1,6 @@
 """Fixes: the fault is gone, what was sound is unchanged, and the note states by how much."""
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -36,7 +37,7 @@ from viewer.linting import (
 from viewer.linting.fixes import FIXES, fix_scene
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skin import normalized, owners
 
@@ -78,6 +79,18 @@ def test_actors_of_one_figure_still_share_it():
     (_note,) = fix_scene(scene).notes
     one, other = scene.actors
     assert one.figure is other.figure and weights_of(one.figure)[5].tolist() == [1.0, 0.0]
+
+
+def test_actors_of_one_figure_play_the_fixed_animation_of_their_own():
+    scales = TransformChannel(2, "scale", [0.0, 1.0], np.full((2, 3), 1.4))
+    turns = TransformChannel(3, "rotation", K / RATE, about_z(waving()))
+    clip = TransformClip("x", (scales, turns), 0.0, 1.9)
+    figure = replace(arm(), animations=(Animation("x", 0.0, 1.9, lambda: clip),))
+    scene = Scene([Actor(figure, clip=clip, animation=0) for _ in range(2)])
+    fix_scene(scene)
+    for actor in scene.actors:
+        assert [one.path for one in actor.clip.channels] == ["rotation"]
+        assert actor.figure.animations[0].plays(actor.clip)
 
 
 def test_vertex_without_weights_gets_those_of_its_neighbours():

@@ -94,6 +94,8 @@ def fix_scene(
 
 def _share(scene: Scene, old: Figure, new: Figure) -> None:
     """Replace a figure also in the other actors that have it: files store it once."""
+    if new.animations is not old.animations:
+        return  # the others still play the keys of the old ones
     for actor in scene.actors:
         if actor.figure is old:
             actor.figure = new
