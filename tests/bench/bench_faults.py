@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -572,6 +572,8 @@ COURSE = {
 
 def course_faults(who: Course, r: Roles, rng: np.random.Generator) -> Iterator[Fault]:
     """Faults of ``.skel``, ``.skin`` and ``.anim`` files."""
+    # Only the root has translations.
+    r = replace(r, hips=who.names[int(np.flatnonzero(who.parents < 0)[0])])
     yield from (fault for fault in faults_of(who, r, rng) if fault.name in COURSE)
     elbow, knee = who[r.elbow], who[r.knee]
     turns = np.unwrap(euler_angles(who.rotations), axis=0)
