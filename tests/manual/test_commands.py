@@ -152,8 +152,8 @@ def cheaper(words: list[str]) -> list[str]:
         more += ["--trim", "98:102"]
     if "--turntable" in words:
         more += ["--fps", "2"]
-    moves = "--bones" in words or any("frames" in word for word in words)
-    if job == "rig" and "--skeleton" not in words and not moves:
+    binds = not {"--skeleton", "--auto", "--bones"}.isdisjoint(words)
+    if job == "rig" and not binds and not any("frames" in word for word in words):
         more += ["--method", "nearest"]
     if job == "render":
         size = "200x200" if "--panels" in words else "160x90"
