@@ -198,6 +198,13 @@ def test_sheets_and_several_objects_are_refused():
         found(united(one, (one[0] + [6.0, 0, 0], one[1])))
 
 
+def test_a_few_stray_vertices_are_reported():
+    rod = pipe([(0, 0, 0), (0, 0, 2)], 0.06, around=48)
+    face = np.array([(1, 0, 0), (1.01, 0, 0), (1, 0.01, 0)]), np.array([[0, 1, 2]])
+    (stray,) = [str(line) for line in found(united(rod, face)).lines if line.code == "R016"]
+    assert stray == "3 vertices are far from the largest part, which has all joints"
+
+
 def test_search_can_be_cancelled():
     def cancel(done, total, unit, what):
         if "limbs" in what:

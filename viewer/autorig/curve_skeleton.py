@@ -559,7 +559,7 @@ def find_skeleton(
     axis_rotations(source.up, named, front)  # checks the names
     with part_of_work(span=(0.0, 0.4)):
         solid = solid_within(target.positions, target.triangles, _FINEST)
-    _check_one(target, solid)
+    n_stray = _check_one(target, solid)
     with part_of_work(span=(0.4, 1.0)):
         found = joints_in(
             solid,
@@ -575,11 +575,15 @@ def find_skeleton(
         up="z" if named == "z" else "y" if named == "y" else source.up,
         unit=source.unit,
     )
-    return CurveSkeleton(figure, tuple(_lines(found, front, alignment.facing is None)))
+    lines = [*_lines(found, front, alignment.facing is None)]
+    if n_stray:
+        n = counted(n_stray, "vertex", "is", "are")
+        lines.append(note("R016.stray: {n} far from the largest part, which has all joints", n=n))
+    return CurveSkeleton(figure, tuple(lines))
 
 
-def _check_one(target: Mesh, solid: Solid) -> None:
-    """Raise ``RigError`` if a mesh consists of parts far from each other."""
+def _check_one(target: Mesh, solid: Solid) -> int:
+    """Return the number of vertices far from the largest part; ``RigError`` if they are many."""
     used = np.unique(target.triangles)
     apart = solid.gaps(target.positions[used]) > _APART * solid.spacing
     if apart.mean() > _FEW:
@@ -587,6 +591,7 @@ def _check_one(target: Mesh, solid: Solid) -> None:
             f"expected one object, found parts far from the largest one: {int(apart.sum())} of "
             f"{counted(len(used), 'vertex')}; rig each object alone"
         )
+    return int(apart.sum())
 
 
 def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
