@@ -1,5 +1,7 @@
 """Skeletons found in shapes made of tubes, whose joints are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from autorig.rigged_shapes import KNEES, TRUNK, beast, mesh_of, pipe, turn, united
@@ -10,6 +12,7 @@ import viewer
 from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.curve_skeleton import Chain, Tree, _Plane, find_skeleton, paired_chains
+from viewer.autorig.medial import Protrusion
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import solid_of
 from viewer.cli import run
@@ -171,6 +174,13 @@ def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long
     for foot in feet:
         assert min(np.linalg.norm(end - foot) for end in ends) < 0.3
     assert len(ends) == 4 and joints["root"][1] > 1.0
+
+
+def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
+    field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
+    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.6, (0,))))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.8, (0,))))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), None))
 
 
 def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):
