@@ -67,6 +67,17 @@ def test_bone_is_drawn_to_every_child_and_not_between_the_children(offscreen, st
     assert at(picture, 2.0, 0.5, 0.5)[3] == 0
 
 
+@pytest.mark.parametrize("style", STYLES)
+def test_skeleton_of_a_replaced_figure_is_drawn(offscreen, style):
+    scene = scene_of([-1, 0], [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0]])
+    before = draw(offscreen, scene, 2.0, style)
+    assert (at(before, 2.0, 0.4, 0.0)[3] > 0, at(before, 2.0, 0.0, 0.4)[3] > 0) == (True, False)
+    places = [[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]
+    scene.actors[0].figure = Figure("bones", skeleton=skeleton([-1, 0], places))
+    after = draw(offscreen, scene, 2.0, style)
+    assert (at(after, 2.0, 0.4, 0.0)[3] > 0, at(after, 2.0, 0.0, 0.4)[3] > 0) == (False, True)
+
+
 def test_end_bone_continues_its_parent_and_rotates(offscreen):
     chain = [-1, 0], [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
     # The length is two fifths of the bone, but at most 7 % of the figure's size of 1.

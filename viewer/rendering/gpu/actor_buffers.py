@@ -86,16 +86,14 @@ class ActorBuffers:
         """Return the boxes of an actor's joints; its figure must have a skeleton."""
         figure = actor.figure
         make = lambda: SkeletonBuffers(self.context, figure, self._cube)  # noqa: E731
-        return self.skeletons.get(actor, make)
+        return self.skeletons.get(actor, make, lambda item: item.figure is figure)
 
     def joint_group(self, group: Group) -> SkeletonBuffers:
         """Return the joints of a group, which are drawn together; ``line_up`` frees them."""
-        figure, kept = group.actors[0].figure, self._joint_groups
+        figure = group.actors[0].figure
         colors = [group.crowd.colors[row] for row in group.rows.tolist()]
         make = lambda: SkeletonBuffers(self.context, figure, self._cube, colors)  # noqa: E731
-        if kept.get(group, make).colors != colors:
-            kept.drop(group)
-        return kept.get(group, make)
+        return self._joint_groups.get(group, make, lambda item: item.colors == colors)
 
     def keypoints_of(self, actor: Actor) -> KeypointBuffers:
         """Return the markers of an actor's keypoints; its figure must have keypoints."""
@@ -103,7 +101,7 @@ class ActorBuffers:
 
         figure = actor.figure
         make = lambda: KeypointBuffers(self.context, figure, self._cube)  # noqa: E731
-        return self.keypoints.get(actor, make)
+        return self.keypoints.get(actor, make, lambda item: item.figure is figure)
 
     def points_of(self, actor: Actor) -> PointBuffers:
         """Return an actor's captured points; its figure must consist of points."""
@@ -111,7 +109,8 @@ class ActorBuffers:
 
         layout = actor.figure.points
         assert layout is not None  # checked by the caller
-        return self.points.get(actor, lambda: PointBuffers(self.context, layout))
+        make = lambda: PointBuffers(self.context, layout)  # noqa: E731
+        return self.points.get(actor, make, lambda item: item.layout is layout)
 
     def motion_path(self, actor: Actor) -> MotionPathBuffers:
         """Return an actor's motion paths."""

@@ -50,8 +50,15 @@ class Kept(Generic[_Key, _Item]):
     def __len__(self) -> int:
         return len(self._items)
 
-    def get(self, of: _Key, make: Callable[[], _Item]) -> _Item:
-        """Return an object's item, creating it if there is none."""
+    def get(
+        self,
+        of: _Key,
+        make: Callable[[], _Item],
+        fits: Callable[[_Item], bool] = lambda item: True,
+    ) -> _Item:
+        """Return an object's item, creating it if there is none that fits."""
+        if id(of) in self._items and not fits(self._items[id(of)][1]):
+            self.drop(of)
         if id(of) not in self._items:
             self._items[id(of)] = (of, make())
         return self._items[id(of)][1]
