@@ -64,6 +64,9 @@ class Lighting:
 
     def begin(self, casters: Casters, up: Up, box: Floats) -> None:
         """Draw the maps shared by all passes; the box, (2, 3), stands on the ground."""
+        if casters.options.quality == "draft":
+            self._spheres, self._contact, self._size, self._begun = None, None, 0.0, ()
+            return
         state = casters.state(), copy(casters.options), up, box.tobytes()
         if state == self._begun:
             return
@@ -74,8 +77,6 @@ class Lighting:
     def _begin(self, casters: Casters, up: Up, box: Floats) -> None:
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
-        if options.quality == "draft":
-            return
         bounds = casters.bounds()
         if not bounds:
             return
