@@ -43,7 +43,7 @@ ENOUGH = 0.5
 
 _FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
 _REMEDY = (
-    "use a template of the same kind, specify --up, --facing or --landmarks, or keep it "
+    "use a template of the same kind or --auto, specify --up, --facing or --landmarks, or keep it "
     "(--keep-doubtful)"
 )
 # Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
