@@ -15,9 +15,8 @@ Limits, in ms of processor time of the main thread on two 2.5 GHz cores:
   for argparse, signals and typing, 5 for the file. Python cannot load these modules faster.
 - ``viewer render``: 36 for 141 modules of this project, 7 for pyrr, 12 to read the files, 7 for the
   camera, 9 to detect that the surface is closed (which saves as much when it is drawn), 12 to skin,
-  9 for background and grid, 12 to free Python's objects at exit. Mesa's driver in software compiles
-  the shader that makes mipmaps anew in each process, 100: its cache does not keep it. A minimal
-  program has none of these; it spends 35 more because it uses Pillow instead of isal.
+  9 for background and grid, 12 for mipmaps, 12 to free Python's objects at exit. A minimal program
+  has none of these; it spends 35 more because it uses Pillow instead of isal.
 """
 
 import io

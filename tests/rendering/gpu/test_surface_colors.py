@@ -24,7 +24,7 @@ from rendering.front_view import (
 
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import upload_surfaces
-from viewer.rendering.gpu.upload import picture_texture
+from viewer.rendering.gpu.upload import picture_texture, reduced
 from viewer.resources import resource
 from viewer.rigs.figure import Figure
 from viewer.rigs.material import Material
@@ -175,6 +175,21 @@ def test_every_level_has_averages_of_linear_light(ctx, size, is_linear):
         seen = level_as_drawn(ctx, texture, level, (columns, rows))
         # Steps of 8-bit sRGB are at most 0.009 in linear light, and drivers round at every level.
         np.testing.assert_allclose(seen, squares.mean(axis=(1, 3)), rtol=0, atol=0.01 * level)
+    texture.release()
+
+
+@pytest.mark.parametrize(("is_linear", "stored_as"), [(False, 0x8C43), (True, 0x8058)])
+def test_mipmaps_of_the_processor_are_those_of_the_driver(ctx, is_linear, stored_as):
+    """The driver rounds each level to 8 bits, so it may be one further off at each."""
+    pixels = noise(16, 64)
+    texture = ctx.texture((64, 16), 4, pixels, internal_format=stored_as)
+    texture.build_mipmaps()
+    levels = [*reduced(pixels, is_linear)]
+    sides = [(max(16 >> level, 1), max(64 >> level, 1), 4) for level in range(1, 7)]
+    assert [one.shape for one in levels] == sides
+    for level, texels in enumerate(levels, 1):
+        made = np.frombuffer(texture.read(level=level), dtype=np.uint8).reshape(texels.shape)
+        np.testing.assert_allclose(texels.astype(int), made, rtol=0, atol=level)
     texture.release()
 
 

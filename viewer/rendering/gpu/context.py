@@ -10,7 +10,7 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -162,6 +162,15 @@ def storage_limit(context: moderngl.Context) -> int:
         return 0
     limit: int = info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
     return limit
+
+
+def gl_function(
+    context: moderngl.Context, name: str, result: type | None, arguments: list[type]
+) -> Callable[..., int | None] | None:
+    """Return a function of OpenGL, called without Python's lock; None if its address is unknown."""
+    loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
+    address = 0 if loader is None else loader(name)
+    return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
 
 
 def explain_failure(text: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from viewer.errors import RenderError, ViewerError
 from viewer.phrases import Remedy
-from viewer.rendering.gpu.context import check_errors
+from viewer.rendering.gpu.context import check_errors, gl_function
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
@@ -227,14 +227,13 @@ class Readback:
 
 def _calls(context: moderngl.Context) -> dict[str, _Call] | None:
     """Return OpenGL's functions by name; None if an address is unknown."""
-    loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
-    addresses = {name: loader(name) if loader is not None else 0 for name in _SIGNATURES}
-    if not all(addresses.values()):
-        return None
-    return {
-        name: ctypes.CFUNCTYPE(result, *arguments)(addresses[name])
-        for name, (result, arguments) in _SIGNATURES.items()
-    }
+    found = {}
+    for name, (result, arguments) in _SIGNATURES.items():
+        call = gl_function(context, name, result, arguments)
+        if call is None:
+            return None
+        found[name] = call
+    return found
 
 
 class Accumulation:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Iterator
+from functools import cache
 from typing import TypeAlias, TypeVar
 
 import moderngl
@@ -9,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import RenderError
-from viewer.rendering.gpu.context import check_errors, is_software
+from viewer.rendering.gpu.context import check_errors, gl_function, is_software
 from viewer.rigs.arrays import Bytes, Floats
+from viewer.rigs.srgb import decode_srgb, encode_srgb
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 _Numbers: TypeAlias = NDArray[np.generic] | list[float]
@@ -20,6 +24,9 @@ _MATRICES_PER_ROW = 256  # a matrix has three texels
 _PAIRS_PER_ROW = 1024
 _RIGID_PER_ROW = 128  # a joint has five texels
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
+_TEXTURE_2D, _RGBA, _UNSIGNED_BYTE = 0x0DE1, 0x1908, 0x1401
+_FEW_TEXELS = 1 << 20  # of a texture whose mipmaps the processor computes
+_MOST_LIGHT = (1 << 14) - 1  # the sum of four texels fits into 16 bits
 
 
 def buffer(context: moderngl.Context, values: ArrayLike, dtype: str) -> moderngl.Buffer:
@@ -112,11 +119,71 @@ def picture_texture(
     stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
     texture = context.texture(size, 4, flipped, internal_format=stored_as)
     texture.repeat_x = texture.repeat_y = False
-    texture.build_mipmaps()
+    _build_mipmaps(context, texture, flipped, is_linear)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # would double the drawing time in software
     return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
+
+
+def _build_mipmaps(
+    context: moderngl.Context, texture: moderngl.Texture, pixels: Bytes, is_linear: bool
+) -> None:
+    """Fill the mipmaps of a texture, whose texels are (H, W, 4) uint8."""
+    upload, (width, height) = None, texture.size
+    # Mesa's driver in software compiles a shader for it in each process: 100 ms. This takes up to
+    # twice as long per texel as the driver does afterwards, 15 ms for the largest: figures with
+    # fewer than ten of them, or many small ones, gain.
+    is_small = width * height <= _FEW_TEXELS and not (width & (width - 1) or height & (height - 1))
+    if is_small and is_software(context):
+        arguments = [ctypes.c_uint, *[ctypes.c_int] * 5, ctypes.c_uint, ctypes.c_uint]
+        upload = gl_function(context, "glTexImage2D", None, [*arguments, ctypes.c_void_p])
+    if upload is None:
+        texture.build_mipmaps()
+        return
+    texture.use()
+    stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
+    for level, texels in enumerate(reduced(pixels, is_linear), 1):
+        height, width = texels.shape[:2]
+        box = width, height, 0
+        kind = _RGBA, _UNSIGNED_BYTE
+        upload(_TEXTURE_2D, level, stored_as, *box, *kind, texels.ctypes.data)
+
+
+def reduced(texels: Bytes, is_linear: bool) -> Iterator[Bytes]:
+    """Yield the mipmaps of (H, W, 4) uint8 texels, whose sides are powers of two, largest first.
+
+    Each texel is the mean light of four, or of two once a side is 1; alpha is linear.
+    """
+    tables = [_light_tables(is_linear)] * 3 + [_light_tables(True)]
+    # Without "clip", ``take`` checks the indices and takes a third longer.
+    planes = [
+        light.take(texels[..., channel], mode="clip") for channel, (light, _) in enumerate(tables)
+    ]
+    two = np.uint16(2)
+    while planes[0].size > 1:
+        sums = [_sums_of_four(plane) for plane in planes]
+        level = np.empty((*sums[0].shape, 4), dtype=np.uint8)
+        for channel, (_, stored) in enumerate(tables):
+            level[..., channel] = stored.take(sums[channel], mode="clip")
+        yield level
+        planes = [(one + two) >> two for one in sums]
+
+
+def _sums_of_four(plane: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Return the sums of 2 x 2 texels of a plane; a side of 1 counts its texels twice."""
+    rows = plane[0::2] + plane[1::2] if len(plane) > 1 else 2 * plane
+    return rows[:, 0::2] + rows[:, 1::2] if plane.shape[1] > 1 else 2 * rows
+
+
+@cache
+def _light_tables(is_linear: bool) -> tuple[NDArray[np.uint16], Bytes]:
+    """Return the light of each stored value, and the stored value of each sum of four lights."""
+    values = np.arange(256) / 255.0
+    # Near black, where sRGB has its finest steps, one step is five units of light.
+    means = np.arange(1 << 16) / (4.0 * _MOST_LIGHT)
+    light, stored = (values, means) if is_linear else (decode_srgb(values), encode_srgb(means))
+    return np.rint(_MOST_LIGHT * light).astype("u2"), np.rint(255.0 * stored).astype("u1")
 
 
 def ramp_texture(context: moderngl.Context, pixels: Bytes) -> moderngl.Texture:
