@@ -146,7 +146,8 @@ def test_items_at_fault_are_found_within_tasks(tmp_path):
 
 def test_workers_that_dask_gives_up_are_replaced(monkeypatch):
     monkeypatch.setitem(dask_cluster._CONFIG, "distributed.deploy.lost-worker-timeout", "1ms")
-    found = finished(Job(), items(20, crash=5), Limits(1, retries=0, cluster="local"))
+    # Dask may close a worker that has just restarted and runs another item: that is tried again.
+    found = finished(Job(), items(20, crash=5), Limits(1, retries=1, cluster="local"))
     assert {n for n, one in found.items() if one.status != "done"} == {5}
 
 
