@@ -373,6 +373,18 @@ def test_batched_matrices_match_each_pose():
     assert np.array_equal(worlds(joints, pose_arrays(poses), rotations), found)
 
 
+@pytest.mark.parametrize("rows", [[0, 2, 1, 3], [2, 5, 0, 4], [1, 2, 3], [6]])
+def test_poses_are_taken_in_the_order_of_the_rows(rows):
+    """Translucent actors are sorted by opacity, so rows need not ascend."""
+    poses = random_poses(moving_skeleton(), 7)
+    found = pose_arrays(poses).rows(np.array(rows))
+    for pose, dofs, places in zip(
+        [poses[k] for k in rows], found.dofs, found.translations, strict=True
+    ):
+        assert_array_equal(dofs, pose.dofs)
+        assert_array_equal(places, pose.translations)
+
+
 def test_skinning_matrices_depend_on_the_shape():
     figure = viewer.load(bundled_body()).actors[0].figure
     poses = []

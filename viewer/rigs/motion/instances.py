@@ -32,9 +32,9 @@ class PoseArrays(NamedTuple):
     """(A, J, 3)."""
 
     def rows(self, rows: NDArray[np.intp]) -> PoseArrays:
-        """Return the values of some of the poses, ascending."""
+        """Return the values of some of the poses, in the order of the rows."""
         # Of consecutive rows, nothing is copied.
-        is_range = len(rows) and rows[-1] - rows[0] + 1 == len(rows)
+        is_range = len(rows) and bool((np.diff(rows) == 1).all())
         which = slice(rows[0], rows[-1] + 1) if is_range else rows
         return PoseArrays(*(part[which] for part in self))
 
