@@ -384,9 +384,10 @@ def _draw_question(state: AppState, result: Result) -> None:
 def discard(state: AppState, result: Result) -> None:
     """Remove a result from the scene, and show the original mesh."""
     view, actors = state.of(Rigging), state.scene.actors
-    row, target = _row(actors, result.actor), result.target
-    # The target has moved to the end of the list; it returns to the place of the result.
-    del actors[_row(actors, target)]
+    target = result.target
+    # Of the places of both, the target takes the first: it has moved behind the first result.
+    row, last = sorted(_row(actors, one) for one in (result.actor, target))
+    del actors[last]
     actors[row] = target
     del view.results[result.method]
     view.comparison, target.visible = None, True
