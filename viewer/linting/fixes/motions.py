@@ -13,6 +13,7 @@ from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Floats
+from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.geometry.quaternion import angles_between, slerp
 from viewer.rigs.motion.animation_choice import play_animation
 from viewer.rigs.motion.clip import Channel, Clip
@@ -185,8 +186,8 @@ def _smoother_rows(
     for joint in sorted(joints):
         own = values[rows, joint]
         pops = _popping(frames, times, partial(_errors, own, lerp=lerp))
-        for first in np.flatnonzero(pops & ~np.roll(pops, 1)).tolist():
-            count = 1 + int(pops[first + 1])
+        for first, stop in runs_of(pops):
+            count = stop - first
             fractions = np.arange(1, count + 1) / (count + 1)
             before, after = (np.tile(own[k], (count, 1)) for k in (first - 1, first + count))
             values[rows[first : first + count], joint] = lerp(before, after, fractions)
