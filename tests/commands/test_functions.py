@@ -87,6 +87,17 @@ def test_diff_has_the_errors_of_papers():
     assert found.exceeds(0.1) and not viewer.diff(still, still).exceeds(0.0)
 
 
+def test_errors_of_poses_are_those_in_which_the_figures_were():
+    """Test poses compare the surfaces, and leave no trace in the errors or in the figures."""
+    still, bent = viewer.Actor(legs()), viewer.Actor(legs())
+    bent["left_hip"] = [np.pi / 2, 0.0, 0.0]
+    dofs = bent.pose.dofs.copy()
+    # A knee 0.5 m and an ankle 1 m below the hip move by a quarter of a circle, of seven joints.
+    expected = 1000.0 * np.sqrt(2.0) * 1.5 / 7.0
+    assert viewer.diff(still, bent).mpjpe == pytest.approx(expected)
+    np.testing.assert_array_equal(bent.pose.dofs, dofs)
+
+
 def test_command_prints_and_stores_the_same_errors(tmp_path, capsys):
     for name, step in (("a", 0.0), ("b", 0.003)):
         places = np.full((8, 3), 0.5)

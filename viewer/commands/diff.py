@@ -270,7 +270,7 @@ def _compared(
         # Comparing poses the reference, which must start in the same pose for each input.
         posed = first.copy()
         with shown_progress(f"comparing {Path(name).name}"):
-            difference = compare(posed, second, skinning, n_poses, frames)
+            difference = compare(posed, second.copy(), skinning, n_poses, frames)
             errors.append(_pose_errors(first, second, frames))
         if is_choice and first.figure.name != second.figure.name:
             paired_with = note("D002.partner: compared with {name}", name=brief(second.name))
@@ -289,7 +289,7 @@ def _pose_errors(reference: Actor, found: Actor, frames: FrameRange | None) -> P
             return pose_errors(found, reference)
         sampled = sample_animation(reference)
         low, count = sampled.first_frame, sampled.frames.n_frames
-        first, stop = (None if end is None else end - low for end in frames)
+        first, stop = (None if end is None else max(end - low, 0) for end in frames)
         return pose_errors(found, reference, (first or 0, count if stop is None else stop))
     except RigError as problem:
         return str(problem)
