@@ -545,7 +545,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
     of_motion += ["--animation"] if arguments.animation else []
     if of_motion:
         raise ViewerError(f"{of_motion[0]}: expected --bones or several mesh files, found neither")
-    if settings_of(SkeletonSettings, arguments) != SkeletonSettings() and not arguments.auto:
+    if changed(SkeletonSettings, arguments) and not arguments.auto:
         raise ViewerError("--symmetry and --joint-spacing: expected --auto, found none")
     if not arguments.skeleton and not arguments.auto:
         return
@@ -554,10 +554,8 @@ def _check_options(arguments: argparse.Namespace) -> None:
         names = " or ".join(BINDING)
         raise ViewerError(f"--method: expected {names} with {source}, found {arguments.method}")
     own, usual = settings_of(TransferSettings, arguments), TransferSettings()
-    match, usual_match = settings_of(MatchSettings, arguments), MatchSettings()
     only_for_templates = {
-        "--max-distance": match.max_distance != usual_match.max_distance,
-        "--max-angle": match.max_angle != usual_match.max_angle,
+        **dict.fromkeys(changed(MatchSettings, arguments), True),
         "--joints": own.joints != usual.joints,
         "--no-fit": own.fits != usual.fits,
         "--no-refine": not settings_of(AlignmentSettings, arguments).refines,
