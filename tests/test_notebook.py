@@ -5,6 +5,7 @@ import re
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import viewer
@@ -54,3 +55,20 @@ def test_notebooks_show_the_page_over_a_picture(formatters, monkeypatch):
 def test_scripts_of_ipython_without_a_shell_are_left_alone(monkeypatch):
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
     show_scenes()
+
+
+def test_widget_numbers_actors_as_its_page_does():
+    """Pages have moving figures first."""
+    pytest.importorskip("anywidget")
+    still, moving = (
+        viewer.figure([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], weights=np.ones((3, 1)),
+                      joints=[[0, 0, 0]], name=name) for name in ("still", "walker")
+    )  # fmt: skip
+    moves = viewer.animate(moving, np.zeros((3, 1, 3)), fps=10)
+    widget = viewer.widget(viewer.Scene([viewer.Actor(still), moves]))
+    names = re.findall(r'"name": ?"(still|motion)"', widget._page)
+    assert names[0] == "motion" and names[1] == "still"
+    widget["still"].pose = widget["still"].pose
+    assert [*widget._poses] == [str(names.index("still"))]
+    widget.selection = ["motion"]
+    assert widget.selection == ("motion",)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from viewer.rigs.scene import Scene
+    from viewer.rigs.skinning import Skinning
 
 SIZE = (480, 360)
 """Size of the pictures, pixels."""
@@ -39,19 +40,21 @@ def picture(scene: Scene) -> bytes:
     return bytes(encode_png(render(scene, SIZE)))
 
 
-def page_of(scene: Scene) -> str:
+def page_of(scene: Scene, skinning: Skinning | None = None) -> str:
     """Return the text of a page that shows a scene: short motions, or the current poses."""
     from viewer.commands._exports import export
-    from viewer.exporters import Part, Selection
+    from viewer.exporters import ExportOptions, Part, Selection
     from viewer.exporters import export as export_selection
+    from viewer.rigs.skinning import Skinning
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.html"
         if _is_short(scene):
-            export(scene, path)
+            export(scene, path, skinning)
         else:
             parts = [Part(actor) for actor in scene.actors if actor.is_present]
-            export_selection(Selection(parts, scene), path)
+            options = ExportOptions(skinning=skinning or Skinning())
+            export_selection(Selection(parts, scene), path, options=options)
         return path.read_text("utf-8")
 
 

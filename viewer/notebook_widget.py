@@ -14,7 +14,6 @@ import traitlets
 
 from viewer.errors import ViewerError
 from viewer.notebook import page_of, picture
-from viewer.rigs.arrays import Floats
 from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import find_joint
@@ -39,15 +38,22 @@ class SceneWidget(anywidget.AnyWidget):
 
     def __init__(self, scene: Scene, skinning: Skinning | None = None, height: int = 420) -> None:
         self._scene, self._skinning = scene, skinning or Skinning()
-        self._shown = [actor for actor in scene.actors if actor.is_present]
-        page = page_of(scene)
-        self._centers = _centers(page)
+        page = page_of(scene, self._skinning)
+        figures = _figures(page)
+        self._centers = [
+            np.array((each.get("mesh") or {}).get("center", [0.0, 0.0, 0.0])) for each in figures
+        ]
+        # A page has moving figures first, and not all actors.
+        left, self._shown = list(scene.actors), list[Actor]()
+        for each in figures:
+            self._shown.append(next(actor for actor in left if actor.name == each["name"]))
+            left.remove(self._shown[-1])
         super().__init__(_page=page, height=height)
         self.observe(self._bend, names="_angles")
 
     def __getitem__(self, name: str) -> ShownActor:
         """Return the handle of the first actor of this name."""
-        return ShownActor(self, self._shown.index(self._scene[name]))
+        return ShownActor(self, self._index(self._scene[name]))
 
     @property
     def selection(self) -> tuple[str, ...]:
@@ -67,7 +73,15 @@ class SceneWidget(anywidget.AnyWidget):
         joint = -1
         if len(names) == 2:
             joint = find_joint(actor.figure.require_skeleton(), names[1])
-        self._selection = [self._shown.index(actor), joint]
+        self._selection = [self._index(actor), joint]
+
+    def _index(self, actor: Actor) -> int:
+        """Return the number of an actor in the page."""
+        if actor not in self._shown:
+            raise ViewerError(
+                f"{actor.name}: expected an actor of the page, found one that it does not show"
+            )
+        return self._shown.index(actor)
 
     def update(self) -> None:
         """Show the current poses of all actors, which may have been changed in place."""
@@ -132,9 +146,9 @@ class ShownActor:
         self._widget._show(self._index)
 
 
-def _centers(page: str) -> list[Floats]:
-    """Return the centres (3,) of the meshes of a page, to which their vertices are relative."""
+def _figures(page: str) -> list[dict[str, Any]]:
+    """Return what a page says of its figures; vertices are relative to the centre of a mesh."""
     found = re.search(r'id="header">(.*?)</script>', page, re.DOTALL)
     assert found is not None  # every page has a header
-    meshes = [figure.get("mesh") or {} for figure in json.loads(found[1])["figures"]]
-    return [np.array(mesh.get("center", [0.0, 0.0, 0.0])) for mesh in meshes]
+    figures: list[dict[str, Any]] = json.loads(found[1])["figures"]
+    return figures
