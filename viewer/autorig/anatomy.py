@@ -275,7 +275,7 @@ def paired(
 
 def _held(one: Limb, other: Limb, lateral: Floats, offset: float) -> float:
     """Return the difference of two limbs if the longer one holds something, infinite for much."""
-    arcs = {id(limb): _arc_lengths(limb.points) for limb in (one, other)}
+    arcs = {id(limb): arc_lengths(limb.points) for limb in (one, other)}
     shorter, longer = sorted((one, other), key=lambda limb: float(arcs[id(limb)][-1]))
     arc, length = arcs[id(longer)], float(arcs[id(shorter)][-1])
     if length < _ARM_OF_ALL * float(arc[-1]):
@@ -412,20 +412,21 @@ def _along(anatomy: Anatomy, path: Ints, fractions: tuple[float, ...], weight: f
 
 
 def _sampled(points: Floats, radii: Floats, fractions: Floats, weight: float) -> Floats:
-    lengths = _arc_lengths(points)
+    lengths = arc_lengths(points)
     at = fractions * lengths[-1]
     columns = [np.interp(at, lengths, column) for column in (*points.T, radii)]
     return np.stack([*columns, np.full(len(at), weight)], axis=1)
 
 
-def _arc_lengths(points: Floats) -> Floats:
+def arc_lengths(points: Floats) -> Floats:
+    """Return the length of a polyline up to each of its points (K, 3): (K,)."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _arm_points(anatomy: Anatomy, limbs: list[Limb]) -> list[Floats]:
     """Return points from the tips of two arms to their junctions with the trunk: (N, 5) each."""
-    arcs = [_arc_lengths(limb.points) for limb in limbs]
+    arcs = [arc_lengths(limb.points) for limb in limbs]
     # Both arms are equally long: what one of them is longer, it holds in its hand. If only its path
     # is longer, one of the arms touches the body. Weapons and shields also have narrow and wide
     # places, so the junction nearer to the plane is that of both.
@@ -471,7 +472,7 @@ def _to_shoulder(anatomy: Anatomy, points: Floats, radii: Floats) -> tuple[Float
     axis of the upper arm leads to the shoulder: until it is as close to the plane as the path's
     end, or about to leave the solid.
     """
-    arc = _arc_lengths(points)
+    arc = arc_lengths(points)
     rows = [int(np.searchsorted(arc, part * arc[-1])) for part in _STRAIGHT]
     upper, rest = points[rows[1]] - points[rows[0]], points[-1] - points[rows[1]]
     lengths = float(np.linalg.norm(upper)), float(np.linalg.norm(rest))
@@ -513,7 +514,7 @@ def _head_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
     if is_quadruped:
         return _along(anatomy, path, (0.25, 0.5, 0.75, 1.0), 0.7)
     points, radii = anatomy.solid.centers(anatomy.solid.voxels[path]), anatomy.paths.radii[path]
-    fractions = _arc_lengths(points)
+    fractions = arc_lengths(points)
     fractions = fractions / fractions[-1]
     low, high = np.searchsorted(fractions, _HEAD)
     head = int(low) + int(radii[low : high + 1].argmax())
@@ -530,7 +531,7 @@ def _tail_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
         return missing
     path = _end_path(anatomy, ends[0], ends[1])
     points = anatomy.solid.centers(anatomy.solid.voxels[path])
-    if len(path) < 5 or _arc_lengths(points)[-1] < _TAIL * anatomy.size:
+    if len(path) < 5 or arc_lengths(points)[-1] < _TAIL * anatomy.size:
         return missing
     return _along(anatomy, path, (0.4, 0.6, 0.8, 1.0), 0.5)
 

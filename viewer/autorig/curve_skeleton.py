@@ -28,7 +28,7 @@ from viewer.autorig.alignment.orientation_search import (
     axis_rotations,
 )
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.anatomy import Limb, paired, sagittal_plane
+from viewer.autorig.anatomy import Limb, arc_lengths, paired, sagittal_plane
 from viewer.autorig.medial import LevelSets, Paths, Protrusion
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import Solid, solid_within
@@ -127,12 +127,6 @@ class Tree:
     """Sorted by the hubs where they begin."""
     tips: Ints
     """(N,). Voxels of the tips."""
-
-
-def arc_lengths(points: Floats) -> Floats:
-    """Return the length of a polyline up to each of its points (K, 3): (K,)."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def at_lengths(points: Floats, lengths: Floats) -> Floats:
