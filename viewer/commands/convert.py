@@ -176,9 +176,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
     """Fix what lint finds in a scene; return notes about changes, and about what remains."""
+    from viewer.diagnostics.codes import codes_in
     from viewer.linting.fixes import FIXES, fix_scene
 
-    codes = [code.strip().upper() for code in text.split(",") if code.strip()]
+    codes = codes_in(text)
     unknown = [code for code in codes if code not in FIXES]
     if unknown:
         raise ViewerError(

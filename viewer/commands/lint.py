@@ -17,6 +17,7 @@ from viewer.commands._scene import add_capture_arguments, add_file_arguments, sc
 from viewer.commands._settings import add_settings, number, settings_of
 from viewer.commands._usage import require_files
 from viewer.data_classes import dataclass
+from viewer.diagnostics.codes import codes_in
 from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
 from viewer.linting import (
@@ -206,7 +207,7 @@ def _checked(arguments: argparse.Namespace) -> Findings:
 
 
 def _ignored(arguments: argparse.Namespace) -> set[str]:
-    ignored = {code.strip().upper() for code in arguments.ignore.split(",") if code.strip()}
+    ignored = set(codes_in(arguments.ignore))
     unknown = sorted(ignored - CODES.keys())
     if unknown:
         hint = did_you_mean(unknown[0], CODES) or "viewer lint --codes lists them"

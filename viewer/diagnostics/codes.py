@@ -303,3 +303,8 @@ CODES: dict[str, Code] = {
     "X008": Code("warning", "fault that cannot be fixed", "fix it in the program that made it"),
 }
 """By code, in the order of lists; a code is never reused with a different meaning."""
+
+
+def codes_in(text: str) -> list[str]:
+    """Return the codes of a list with commas, as an option has it, in capitals."""
+    return [code.strip().upper() for code in text.split(",") if code.strip()]

@@ -17,7 +17,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import edges_of
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import joint_labels
-from viewer.rigs.skin import Skin, merged, normalized, owners, row_norms
+from viewer.rigs.skin import Skin, merged, normalized, owners, row_norms, skin_rows
 
 _TORN = 0.05  # total difference of weights beyond rounding: a gap of 5 % of what the joints move
 _ALL_TORN = 0.5  # fraction of seam vertices above which the parts are separate by design
@@ -58,15 +58,13 @@ def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterat
     twins[copies] = True
     rows = np.flatnonzero(twins[vertices])
     # The influences of each copy, and those of its original with a minus sign.
-    counts = np.diff(whole.starts)
     originals = surface.place[copies]
-    index = np.repeat(whole.starts[originals] - np.cumsum(counts[originals]), counts[originals])
-    index = index + np.repeat(counts[originals], counts[originals]) + np.arange(len(index))
+    twin = skin_rows(whole, originals.astype(np.int32))
     differences = row_norms(
         mesh.n_vertices,
-        np.concatenate([vertices[rows], np.repeat(copies, counts[originals])]),
-        np.concatenate([whole.joints[rows], whole.joints[index]]),
-        np.concatenate([whole.weights[rows], -whole.weights[index]]),
+        np.concatenate([vertices[rows], copies[owners(twin)]]),
+        np.concatenate([whole.joints[rows], twin.joints]),
+        np.concatenate([whole.weights[rows], -twin.weights]),
     )
     # Rigid parts that touch, such as a shield and its badge, move apart by design.
     top = np.zeros(mesh.n_vertices)

@@ -92,7 +92,8 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
     np.maximum.at(largest, found.joints, found.weights)
     mostly = found.weights >= _MOSTLY * largest[found.joints]
     surface = surface_of(figure)
-    parts = components(len(found.places), found.links)[found.node]
+    place_parts = components(len(found.places), found.links)
+    parts = place_parts[found.node]
     is_minor = _are_minor(found, parts, distances)
     # A vertex that is far away must not extend the reach by which it is judged.
     own = np.flatnonzero(mostly & ~is_minor)
@@ -106,7 +107,7 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
     leaks = (beyond > _BEYOND) & (distances > _TWICE * reach[found.joints])
     n_far, n_own = (np.bincount(found.joints[k], minlength=len(reach)) for k in (leaks, mostly))
     stray |= leaks & (n_far > n_own)[found.joints]
-    stray |= _are_alone(found, surface, parents) & is_minor & (distances > _NEAR)
+    stray |= _are_alone(found, surface, place_parts, parents) & is_minor & (distances > _NEAR)
     stray &= ~np.isin(found.joints, swapped[:, 0]) & ~_are_adjacent(found, parents)
     whole = stray & _are_islands(surface, found, parts) if stray.any() else stray
     strays, islands = np.flatnonzero(stray & ~whole), np.flatnonzero(whole)
@@ -127,10 +128,12 @@ def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
     return minor
 
 
-def _are_alone(found: Support, surface: Surface, parents: Ints) -> Bools:
-    """Return which influences are of single places inside the region of another joint: (N,)."""
+def _are_alone(found: Support, surface: Surface, part: Indices, parents: Ints) -> Bools:
+    """Return which influences are of single places inside the region of another joint: (N,).
+
+    ``part``: (M,), of the influences of places that are connected.
+    """
     count = len(found.places)
-    part = components(count, found.links)
     largest = np.zeros(count)
     np.maximum.at(largest, part, found.place_weights)
     n_places = np.bincount(part, minlength=count)

@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import FEWEST
-from viewer.phrases import counted, listed
+from viewer.phrases import agree, counted, listed
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import unit
@@ -63,7 +63,7 @@ def check(subject: Subject) -> Iterator[Finding]:
         "W017.twist: twisted by 90°, {n} much of the volume around {them}: {names}; weights that "
         "change evenly lose 33 %",
         n=counted(len(lost), "joint", "loses", "lose"),
-        them="it" if len(lost) == 1 else "them",
+        them=agree(len(lost), "it", "them"),
         names=listed(names),
         vertices=np.concatenate([blending[k] for k in order]),
         joints=[lost[k][1] for k in order],

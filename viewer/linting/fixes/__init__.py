@@ -68,13 +68,13 @@ def fix_scene(
 ) -> Fixed:
     """Fix what lint finds in a scene, in place: warnings and errors, or all with these codes."""
     chosen, notes, tried = options or LintOptions(), list[Diagnostic](), set[tuple[int, str]]()
-    for number in range(_ROUNDS):
-        report(number, _ROUNDS, what="fixing")
-        found = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
-        todo = [one for one in found if one.code in FIXES and _key(one) not in tried]
-        todo.sort(key=lambda one: [*FIXES].index(one.code))
-        if not todo:
+    for number in range(_ROUNDS + 1):
+        report(number, _ROUNDS + 1, what="fixing")
+        left = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
+        todo = [one for one in left if one.code in FIXES and _key(one) not in tried]
+        if not todo or number == _ROUNDS:
             break
+        todo.sort(key=lambda one: [*FIXES].index(one.code))
         for finding in todo:
             assert finding.actor is not None  # findings of checks are about actors
             subject = Subject(scene.actors[finding.actor], finding.actor, scene.up, chosen)
@@ -86,9 +86,8 @@ def fix_scene(
             else:
                 notes.append(said)
                 _share(scene, figure, subject.actor.figure)
-    if scene.time is not None:
-        pose_actors(scene.actors, scene.time)
-    left = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
+        if scene.time is not None:
+            pose_actors(scene.actors, scene.time)
     return Fixed(_merged(notes), left)
 
 

@@ -10,7 +10,7 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.linting._surface import surface_of
-from viewer.phrases import counted
+from viewer.phrases import agree, counted
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.mesh import vertex_normals
 
@@ -79,6 +79,6 @@ def _flattened(subject: Subject, finding: Finding) -> Diagnostic | None:
         "to {most}",
         figure=subject.actor.name,
         n=counted(len(spikes), "place"),
-        their="its" if len(spikes) == 1 else "their",
+        their=agree(len(spikes), "its", "their"),
         most=subject.length(float(moved.max())),
     )

@@ -13,7 +13,7 @@ from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import Surface, surface_of
 from viewer.linting.stray_weights import misplaced_weights
 from viewer.phrases import counted, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.skin import (
     Skin,
     has_influence,
@@ -109,13 +109,10 @@ def _from_neighbours(subject: Subject, skin: Skin, surface: Surface, vertices: I
     edges = edges[given[edges[:, 1]]]
     if len(edges):
         rows = skin_rows(skin, edges[:, 1].astype(np.int32))
-        place = edges[owners(rows), 0].astype(np.int64)
-        keys, index = np.unique(place * skin.n_joints + rows.joints, return_inverse=True)
-        sums = np.bincount(index, rows.weights).astype(np.float64, copy=False)
-        places, joints = np.divmod(keys, skin.n_joints)
         has_some = np.zeros(len(surface.place), dtype=np.bool_)
         has_some[edges[:, 0]] = True
-        skin = _with_rows(skin, surface, has_some[surface.place], places, joints, sums)
+        moving = has_some[surface.place]
+        skin = _with_rows(skin, surface, moving, edges[owners(rows), 0], rows.joints, rows.weights)
         vertices = vertices[~has_some[surface.place[vertices]]]
     return _from_nearest(subject, skin, vertices)
 
@@ -141,31 +138,30 @@ def _from_nearest(subject: Subject, skin: Skin, vertices: Indices) -> Skin:
 def _rejoined(skin: Skin, surface: Surface, vertices: Indices) -> Skin:
     """Give all vertices at the places of some the mean of their weights."""
     torn = np.isin(surface.place, surface.place[vertices])
-    where = np.flatnonzero(torn)
-    counts = np.bincount(surface.place[where], minlength=len(surface.place))
     entries = np.flatnonzero(torn[owners(skin)])
-    place = surface.place[owners(skin)[entries]].astype(np.int64)
-    keys, index = np.unique(place * skin.n_joints + skin.joints[entries], return_inverse=True)
-    places, joints = np.divmod(keys, skin.n_joints)
-    sums = np.bincount(index, skin.weights[entries]).astype(np.float64, copy=False)
-    means = sums / counts[places]
-    return _with_rows(skin, surface, torn, places, joints, means)
+    places = surface.place[owners(skin)[entries]]
+    return _with_rows(skin, surface, torn, places, skin.joints[entries], skin.weights[entries])
 
 
 def _with_rows(
-    skin: Skin, surface: Surface, changed: Bools, places: Indices, joints: Indices, weights: Floats
+    skin: Skin,
+    surface: Surface,
+    changed: Bools,
+    places: Indices,
+    joints: Indices | Ints,
+    weights: Floats,
 ) -> Skin:
-    """Replace the weights of vertices (V,) by those of their places, sorted by place."""
+    """Replace the weights of vertices (V,) by sums of entries (N,) of their places, normalised."""
+    entries = places.astype(np.int32), joints.astype(np.int32), weights
+    sums = merged(skin_from_entries(skin.n_vertices, *entries, skin.inverse_bind))
     where = np.flatnonzero(changed)
-    first = np.searchsorted(places, surface.place[where], side="left")
-    counts = np.searchsorted(places, surface.place[where], side="right") - first
-    index = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    rows = skin_rows(sums, surface.place[where].astype(np.int32))
     kept = ~changed[owners(skin)]
     found = skin_from_entries(
         skin.n_vertices,
-        np.concatenate([owners(skin)[kept], np.repeat(where, counts)]),
-        np.concatenate([skin.joints[kept], joints[index]]),
-        np.concatenate([skin.weights[kept], weights[index]]),
+        np.concatenate([owners(skin)[kept], where[owners(rows)]]),
+        np.concatenate([skin.joints[kept], rows.joints]),
+        np.concatenate([skin.weights[kept], rows.weights]),
         skin.inverse_bind,
     )
     return normalized(replace(found, dqs_fractions=skin.dqs_fractions))
@@ -193,19 +189,16 @@ def _mirrored(subject: Subject, skin: Skin, surface: Surface, vertices: Indices)
     partners = np.where(mirror.joints >= 0, mirror.joints, np.arange(skin.n_joints))
     own = skin_rows(whole, places.astype(np.int32))
     other = skin_rows(whole, mirror.vertices[places].astype(np.int32))
-    keys = np.concatenate(
-        [
-            places[owners(own)] * skin.n_joints + own.joints,
-            places[owners(other)] * skin.n_joints + partners[other.joints],
-        ]
-    )
-    distinct, index = np.unique(keys, return_inverse=True)
-    sums = np.bincount(index, np.concatenate([own.weights, other.weights]))
-    means = 0.5 * sums.astype(np.float64, copy=False)
-    place, joint = np.divmod(distinct, skin.n_joints)
     moving = np.zeros(len(surface.place), dtype=np.bool_)
     moving[places] = True
-    return _with_rows(whole, surface, moving[surface.place], place, joint, means)
+    return _with_rows(
+        whole,
+        surface,
+        moving[surface.place],
+        np.concatenate([places[owners(own)], places[owners(other)]]),
+        np.concatenate([own.joints, partners[other.joints]]),
+        np.concatenate([own.weights, other.weights]),
+    )
 
 
 def _smoothed(skin: Skin, surface: Surface, vertices: Indices) -> Skin:
