@@ -28,7 +28,7 @@ from viewer.commands._scene import PICTURES, print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, described, note
-from viewer.diagnostics.record import is_recorded, note_values
+from viewer.diagnostics.record import finite, is_recorded, note_values
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
@@ -619,18 +619,13 @@ def _actor(name: str, difference: Difference, errors: PoseErrors | str) -> Diffe
 def _errors_data(errors: PoseErrors) -> PoseErrorData:
     """Return errors of a motion as JSON data."""
     return {
-        "mpjpe": _finite(errors.mpjpe),
-        "pa_mpjpe": _finite(errors.pa_mpjpe),
-        "pve": _finite(errors.pve),
-        "acceleration": _finite(errors.acceleration),
-        "foot_skate": _finite(errors.foot_skate),
+        "mpjpe": finite(errors.mpjpe),
+        "pa_mpjpe": finite(errors.pa_mpjpe),
+        "pve": finite(errors.pve),
+        "acceleration": finite(errors.acceleration),
+        "foot_skate": finite(errors.foot_skate),
         "frames": errors.n_frames,
     }
-
-
-def _finite(value: float) -> float | None:
-    """Return a number, or None for NaN, which JSON lacks."""
-    return value if math.isfinite(value) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

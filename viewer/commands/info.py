@@ -18,7 +18,7 @@ from viewer.commands._scene import add_scene_arguments, open_scene, scene_option
 from viewer.commands._settings import settings_of, stated
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
-from viewer.diagnostics.record import JsonObject, note_values
+from viewer.diagnostics.record import JsonObject, finite, note_values
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import Up
@@ -148,18 +148,14 @@ def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> JsonObject:
             {
                 "name": f"{labels[joint]}.{DOF_KINDS[kind]}",
                 "value": value,
-                "minimum": _finite(low),
-                "maximum": _finite(high),
+                "minimum": finite(low),
+                "maximum": finite(high),
             }
             for joint, kind, value, (low, high) in zip(
                 skeleton.dof_joints, skeleton.dof_kinds, dofs, limits.tolist(), strict=True
             )
         ],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _describe_mesh(mesh: Mesh) -> JsonObject:

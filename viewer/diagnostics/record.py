@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
 
 JsonObject: TypeAlias = dict[str, Any]
 """A description as JSON data: numbers, texts, lists and objects by name."""
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for infinity and NaN, which JSON lacks."""
+    return value if math.isfinite(value) else None
 
 
 @dataclass
