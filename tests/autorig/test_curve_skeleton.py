@@ -93,7 +93,7 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
         for tip, points in enumerate([*shapes, [(0, 0.5, 0), (0.01, 0.6, 0), (0.01, 1.0, 0)]])
     )
     row = np.zeros(1, dtype=np.int32)
-    tree = Tree(np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, np.arange(3))
+    tree = Tree(np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3)
     plane = _Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
     assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
 

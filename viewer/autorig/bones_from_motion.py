@@ -23,6 +23,7 @@ from viewer.phrases import counted
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import align_signs
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, up_rotation
 from viewer.rigs.geometry.transform import affine_matrices, apply_transform
 from viewer.rigs.motion.moving_mesh import FrameErrors, MovingMesh, frame_errors, posed_rows
@@ -272,10 +273,7 @@ def _clip(
     offsets[:, has] -= skeleton.rest_translations[has]
     turns[:, has] = above @ turns[:, has]
     rotations = matrix_to_quaternion(turns)
-    for frame in range(1, count):
-        # Of both signs of a quaternion, the one near the frame before, for programs that blend.
-        flips = (rotations[frame] * rotations[frame - 1]).sum(axis=1) < 0.0
-        rotations[frame, flips] *= -1.0
+    align_signs(rotations)  # for programs that blend keys
     return _timed(moving, SampledClip(moving.figure.name, _timing(moving), rotations, offsets))
 
 

@@ -125,8 +125,8 @@ class Tree:
     """(H,). Their voxels."""
     chains: tuple[Chain, ...]
     """Sorted by the hubs where they begin."""
-    tips: Ints
-    """(N,). Voxels of the tips."""
+    routes: tuple[Ints, ...]
+    """Voxels of the path from the place to each tip."""
 
 
 def at_lengths(points: Floats, lengths: Floats) -> Floats:
@@ -196,6 +196,7 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
     """Return the paths from the tips of a solid to one of its voxels, as hubs and chains."""
     field = _Field(solid, paths, source)
     hub_of, hubs = _hubs(field.routes, paths.radii, field.centers, source)
+    passed = {k: {hub_of.get(row) for row in route.tolist()} for k, route in field.routes.items()}
     members = [[row for row, hub in hub_of.items() if hub == number] for number in range(len(hubs))]
     places = np.array([field.centers[rows].mean(axis=0) for rows in members])
     places[0] = field.centers[source]
@@ -208,11 +209,7 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
                 continue  # another way to a hub
             if any(number in chain.tips and chain.end == end for chain in chains):
                 continue
-            beyond = frozenset(
-                k
-                for k, other in field.routes.items()
-                if k == number or (end >= 0 and end in {hub_of.get(int(row)) for row in other})
-            )
+            beyond = frozenset({number, *(k for k in passed if end >= 0 and end in passed[k])})
             width = max(float(np.median(field.widths(rows))), solid.spacing)
             ends = places[start], places[end] if end >= 0 else None
             points = field.path(rows, ends, width)
@@ -222,8 +219,7 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
             chains.append(Chain(start, end, points, width, begin, beyond))
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
-    tips = field.tips.rows[[*field.routes]]
-    return Tree(places, paths.radii[rows], rows, ordered, tips)
+    return Tree(places, paths.radii[rows], rows, ordered, tuple(field.routes.values()))
 
 
 def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner: bool) -> int:
@@ -300,41 +296,45 @@ def _smooth(points: Floats, rounds: int) -> Floats:
     return points
 
 
-def trunk(solid: Solid, paths: Paths, up: Floats) -> int:
-    """Return the voxel in which the skeleton has its root."""
+def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
+    """Return the hubs and chains of a solid outwards from its trunk."""
     centers = solid.centers(solid.voxels)
     deepest = np.flatnonzero(paths.radii >= paths.radii.max() - 1e-9)
     middle = centers.mean(axis=0)
     source = int(deepest[np.linalg.norm(centers[deepest] - middle, axis=1).argmin()])
+    report_fraction(0.1)
     tree = tree_of(solid, paths, source)
-    heights = centers @ up
+    report_fraction(0.4)
+    root = source if len(tree.chains) == 0 else _trunk(solid, paths, tree, centers @ up)
+    return tree if root == source else tree_of(solid, paths, root)
+
+
+def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
+    """Return the voxel in which the skeleton has its root; ``heights`` (N,) of all voxels."""
     low, high = float(heights.min()), float(heights.max())
-    if len(tree.chains) == 0:
-        return source
-    ends = [int(row) for row in tree.tips]
-    at_source = [chain for chain in tree.chains if chain.start == 0]
-    if len(at_source) == 1:
-        ends.append(source)
-    inside = [_inside_end(solid, paths, end, source) for end in ends]
+    inwards = [route[::-1] for route in tree.routes]
+    if sum(chain.start == 0 for chain in tree.chains) == 1:
+        inwards.append(tree.rows[:1])
+    inside = [_inside_end(solid, paths, route) for route in inwards]
     wide = paths.radii[inside]
     relative = (heights[inside] - wide - low) / max(high - low, solid.spacing)
     foot = int(relative.argmin())
-    others = np.delete(np.arange(len(ends)), foot)
+    others = np.delete(np.arange(len(inside)), foot)
     if (
         relative[foot] <= _FOOT
         and (relative[others] >= _STANDS).all()
         and (wide[foot] >= _STEADY * wide[others]).all()
     ):
         return inside[foot]
-    if len(ends) == 2:
-        return _thicker_end(solid, paths, ends)
+    if len(inwards) == 2:
+        return _thicker_end(solid, paths, [int(route[0]) for route in inwards])
     # As in the centroid of a tree, with tips as weights; ties go to the wider place.
-    count = len(tree.tips)
+    count = len(tree.routes)
     most = []
     for hub in range(len(tree.hubs)):
         beyond = [len(chain.tips) for chain in tree.chains if chain.start == hub]
-        inwards = count - sum(beyond) if hub else 0
-        most.append((max([inwards, *beyond]), -float(tree.radii[hub])))
+        before = count - sum(beyond) if hub else 0
+        most.append((max([before, *beyond]), -float(tree.radii[hub])))
     return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
 
 
@@ -343,15 +343,13 @@ def _thicker_end(solid: Solid, paths: Paths, ends: list[int]) -> int:
     (route,) = paths.to(np.array(ends[:1]), np.array(ends[1:]))
     third = max(1, len(route) // 3)
     first, last = paths.radii[route[:third]].mean(), paths.radii[route[-third:]].mean()
-    here, there = (route[0], route[-1]) if first > last else (route[-1], route[0])
-    return _inside_end(solid, paths, int(here), int(there))
+    return _inside_end(solid, paths, route if first > last else route[::-1])
 
 
-def _inside_end(solid: Solid, paths: Paths, tip: int, other: int) -> int:
-    """Return the voxel in the middle of the solid near an end of it."""
-    (route,) = paths.to(np.array([other]), np.array([tip]))
+def _inside_end(solid: Solid, paths: Paths, route: Ints) -> int:
+    """Return the voxel in the middle of the solid near the beginning of a path from a tip."""
     if len(route) < 2:
-        return tip
+        return int(route[0])
     lengths = arc_lengths(solid.centers(solid.voxels)[route])
     radius = float(np.median(paths.radii[route]))
     near = lengths <= max(2.0 * radius, solid.spacing)
@@ -637,9 +635,7 @@ def joints_in(
     """Return the joints of a solid; ``up``, ``front``: (3,), its directions."""
     report_fraction(0.0, "looking for limbs")
     paths = Paths(solid)
-    root = trunk(solid, paths, up)
-    report_fraction(0.4)
-    tree = tree_of(solid, paths, root)
+    tree = rooted_tree(solid, paths, up)
     if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
         raise RigError("expected a solid with limbs, found a sheet without thickness")
     report_fraction(0.8, "placing joints")

@@ -48,7 +48,7 @@ from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.phrases import Remedy
 from viewer.progress import part_of_work
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import Up
@@ -134,14 +134,19 @@ def align_posed(
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # outward normals distinguish the two sides of a limb
     theirs = Posed(target.positions, triangles)
-    job = _job(template, pose, target.positions, triangles, settings)
-    if fits and keeps(settings):
+    if not fits or settings.scale == "axes":
+        rigid = align(ours, theirs, template.up, settings)
+        return PosedAlignment(rigid, template, pose, posed, ())
+    exact = Triangles(target.positions, triangles, settings.samples)
+    cloud = Cloud(exact.samples, sample_surface(target.positions, triangles, settings.dense))
+    job = _Job(template, pose, cloud, exact, settings.scale != "none", settings)
+    if keeps(settings):
         return _by_landmarks(job, ours, theirs)
     by_limbs: list[_LimbFit] = []
     solids: tuple[Solid, Solid] | None = None
     # Whoever gives a place or a scale knows better; and equal shapes need no other fit.
     is_searched = settings.matrix is None and settings.landmarks is None
-    has_limbs = fits and is_searched and settings.scale == "uniform"
+    has_limbs = is_searched and settings.scale == "uniform"
     with part_of_work(span=(0.0, 0.05)):
         is_new = has_limbs and not nearly_similar(ours, theirs, template.up, settings)
     if is_new:
@@ -154,7 +159,7 @@ def align_posed(
     with part_of_work(span=(0.5, 0.7)):
         rigid = align(ours, theirs, template.up, settings)
     kept = PosedAlignment(rigid, template, pose, posed, (), solids=solids)
-    if settings.scale == "axes" or not fits or misfit(rigid, rigid.away > PART) <= _CLOSE:
+    if misfit(rigid, rigid.away > PART) <= _CLOSE:
         return kept
     if has_limbs and not is_new and rigid.how in _FOUND:
         with part_of_work(span=(0.7, 0.8)):
@@ -194,14 +199,6 @@ def _by_landmarks(job: _Job, ours: Posed, theirs: Posed) -> PosedAlignment:
     best = replace(best, alignment=replace(best.alignment, how="landmarks"), solids=solids)
     gap = Phrase("a gap of {after:.2f} % of the size", after=100.0 * misfit(best.alignment, False))
     return replace(best, lines=(*best.lines, note(wording.GAP, gap=gap)))
-
-
-def _job(
-    template: Figure, pose: Pose, positions: Floats, triangles: Ints, settings: AlignmentSettings
-) -> _Job:
-    exact = Triangles(positions, triangles, settings.samples)
-    cloud = Cloud(exact.samples, sample_surface(positions, triangles, settings.dense))
-    return _Job(template, pose, cloud, exact, settings.scale != "none", settings)
 
 
 def _starts(
