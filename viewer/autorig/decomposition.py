@@ -15,6 +15,7 @@ not grow with them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,10 @@ from viewer.phrases import printable
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.transform import affine_matrices
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _KEY_FRAMES, _KEY_VERTICES = 60, 3000  # from which bones are found
 _ROUNDS, _LAST_ROUNDS = 4, 100  # of weights and transforms: after each addition, most at the end
@@ -208,8 +213,7 @@ def _new_bones(u: Floats, v: Floats, errors: Floats, count: int) -> Floats:
         for size in _NEAR:
             near = order[:size]
             moved = _aligned(u[near], v[:, near], np.ones((len(near), 1)))
-            alone = _squared_errors(u, v, np.ones((len(u), 1)), moved).sum(axis=0)
-            rest = np.minimum(left, alone)
+            rest = np.minimum(left, _Products(u, v, moved).alone[:, 0])
             tried.append((float(rest.sum()), moved, rest))
         _, moved, left = min(tried, key=lambda each: each[0])
         found.append(moved)
@@ -221,11 +225,9 @@ def _divided(u: Floats, v: Floats, moved: Floats) -> Floats:
 
     Clusters separate old bones from new ones at once; weights would do that in many rounds.
     """
-    alone, moved = np.ones((len(u), 1)), moved.copy()
+    moved = moved.copy()
     for _ in range(_DIVISIONS):
-        each = range(moved.shape[1])
-        errors = [_squared_errors(u, v, alone, moved[:, b : b + 1]).sum(axis=0) for b in each]
-        nearest = np.eye(len(errors))[np.argmin(errors, axis=0)]
+        nearest = np.eye(moved.shape[1])[_Products(u, v, moved).alone.argmin(axis=1)]
         fits = nearest.sum(axis=0) >= _FEWEST
         moved[:, fits] = _aligned(u, v, nearest[:, fits])
     return moved
@@ -255,33 +257,68 @@ def _improved(
 
 def _weights(u: Floats, v: Floats, moved: Floats, most: int) -> Floats:
     """Return the best weights (V, B) for given transforms, at most ``most`` for each vertex."""
-    weights = np.zeros((len(u), moved.shape[1]))
-    for part in _rows_within(len(u), 3 * len(moved) * moved.shape[1]):
-        weights[part] = _weights_of(u[part], v[:, part], moved, most)
-    return weights
-
-
-def _weights_of(u: Floats, v: Floats, moved: Floats, most: int) -> Floats:
-    # As the weights sum to 1, the error is sum_b w_b d_b with d_b = M_b u - v, so its square is
-    # w^T G w with G_bc = d_b . d_c over all frames: no other term can lose digits.
-    by_bone = moved[:, :, :3].transpose(1, 0, 2, 3)
-    turned = (u @ by_bone[..., :3].reshape(-1, 3).T).reshape(len(u), *by_bone.shape[:3])
-    apart = turned + by_bone[..., 3] - v.transpose(1, 0, 2)[:, None]
-    apart = apart.reshape(len(u), moved.shape[1], -1)
-    alone = np.einsum("nbk,nbk->nb", apart, apart)
     count = min(_CANDIDATES, moved.shape[1])
-    best = np.argpartition(alone, count - 1, axis=1)[:, :count]
-    rows = np.arange(len(u))[:, None]
-    near = apart[rows, best]
-    gram = near @ near.transpose(0, 2, 1) + len(moved) * _NOISE**2 * np.eye(count)
-    found = _convex(gram, np.ones((len(u), count), dtype=np.bool_))
-    if count > most:
-        kept = np.zeros_like(found, dtype=np.bool_)
-        kept[rows, np.argpartition(-found, most - 1, axis=1)[:, :most]] = True
-        found = _convex(gram, kept & (found > 0.0))
     weights = np.zeros((len(u), moved.shape[1]))
-    weights[rows, best] = found
+    for part in _rows_within(len(u), 10 * count**2 + 3 * len(moved) + 4 * moved.shape[1]):
+        # As the weights sum to 1, the error is sum_b w_b d_b with d_b = M_b u - v, so its square is
+        # w^T G w with G_bc = d_b . d_c over all frames.
+        products = _Products(u[part], v[:, part], moved)
+        order = np.argpartition(products.alone, count - 1, axis=1)
+        best = order[:, :count].astype(np.int32)
+        rows = np.arange(len(best))[:, None]
+        gram = products.between(best) + len(moved) * _NOISE**2 * np.eye(count)
+        found = _convex(gram, np.ones(best.shape, dtype=np.bool_))
+        if count > most:
+            kept = np.zeros_like(found, dtype=np.bool_)
+            kept[rows, np.argpartition(-found, most - 1, axis=1)[:, :most]] = True
+            found = _convex(gram, kept & (found > 0.0))
+        weights[part][rows, best] = found
     return weights
+
+
+class _Products:
+    """Products d_b . d_c, summed over all frames, of the errors d_b = M_b u - v of bones alone.
+
+    M_b u . M_c u = u^T (M_b^T M_c) u with sums over frames that all vertices share, so that the
+    errors themselves, frames times bones times vertices, are never made. Around the middle of each
+    frame, the terms are about as large as the mesh, 1: what they lose is far below ``_NOISE``.
+    """
+
+    def __init__(self, u: Floats, v: Floats, moved: Floats) -> None:
+        n_bones, middles = moved.shape[1], v.mean(axis=1)
+        near = moved[:, :, :3].copy()
+        near[..., 3] -= middles[:, None]
+        # (3 F, 4 B) and (V, 3 F): all frames and axes one below the other.
+        bones = near.transpose(0, 2, 1, 3).reshape(-1, 4 * n_bones)
+        rows = (v - middles[:, None]).transpose(1, 0, 2).reshape(len(u), -1)
+        padded = np.concatenate([u, np.ones((len(u), 1))], axis=1)
+        pairs = (bones.T @ bones).reshape(n_bones, 4, n_bones, 4).transpose(0, 2, 1, 3)
+        # A quadratic form has 10 terms: both of its coefficients of u_j u_k, j < k, are one.
+        first, second = np.triu_indices(4)
+        twice = np.where(first == second, 0.0, 1.0)
+        self._pairs = pairs[..., first, second] + twice * pairs[..., second, first]
+        self._terms = padded[:, first] * padded[:, second]
+        crossed = (rows @ bones).reshape(len(u), n_bones, 4)
+        self._crossed = np.einsum("nbk,nk->nb", crossed, padded)
+        self._squares = np.einsum("nk,nk->n", rows, rows)
+
+    @property
+    def alone(self) -> Floats:
+        """(V, B). Squared errors, d_b . d_b."""
+        squares = self._terms @ self._pairs[(np.arange(len(self._pairs)),) * 2].T
+        return np.maximum(squares - 2.0 * self._crossed + self._squares[:, None], 0.0)
+
+    def between(self, chosen: Ints) -> Floats:
+        """Return the products (V, K, K) of some bones for each vertex (V, K)."""
+        first, second = np.triu_indices(chosen.shape[1])
+        both = np.einsum(
+            "npt,nt->np", self._pairs[chosen[:, first], chosen[:, second]], self._terms
+        )
+        crossed = np.take_along_axis(self._crossed, chosen, axis=1)
+        products = both - crossed[:, first] - crossed[:, second] + self._squares[:, None]
+        found = np.empty((len(chosen), chosen.shape[1], chosen.shape[1]))
+        found[:, first, second] = found[:, second, first] = products
+        return found
 
 
 def _convex(gram: Floats, allowed: Bools) -> Floats:
@@ -305,34 +342,39 @@ def _convex(gram: Floats, allowed: Bools) -> Floats:
     return weights
 
 
+def _coefficients(u: Floats, weights: Floats) -> csr_array:
+    """Return the coefficients w_ib (u_i, 1) of all transforms in each vertex, sparse (V, 4 B)."""
+    from scipy.sparse import csr_array
+
+    # Four entries for each weight.
+    weighted = csr_array(weights)
+    places = 4 * weighted.indices[:, None] + np.arange(4)
+    owners = np.repeat(np.arange(len(u)), np.diff(weighted.indptr))
+    padded = np.concatenate([u, np.ones((len(u), 1))], axis=1)[owners]
+    entries = (weighted.data[:, None] * padded).ravel(), places.ravel(), 4 * weighted.indptr
+    return csr_array(entries, shape=(len(u), 4 * weights.shape[1]))
+
+
+def _targets(rows: csr_array, v: Floats) -> Floats:
+    """Return sum_i w_ib v_fi (u_i, 1)^T from coefficients (V, 4 B) and positions: (F, B, 3, 4)."""
+    flat = rows.T @ v.transpose(1, 0, 2).reshape(v.shape[1], -1)
+    return np.asarray(flat.reshape(-1, 4, len(v), 3).transpose(2, 0, 3, 1))
+
+
 class _Moments:
     """Sums over the vertices of a mesh that the fit of transforms needs in every frame."""
 
     def __init__(self, u: Floats, weights: Floats) -> None:
-        from scipy.sparse import csr_array
-
-        self.n_bones = weights.shape[1]
-        padded = np.concatenate([u, np.ones((len(u), 1))], axis=1)
-        products = weights[:, :, None] * padded[:, None]
-        flat = csr_array(products.reshape(len(u), -1))
-        self.rows = flat
-        """(V, 4 B). w_ib (u_i, 1), the coefficients of all transforms."""
-        sums = (flat.T @ flat).toarray().reshape(self.n_bones, 4, self.n_bones, 4)
+        self.n_bones, self.rows = weights.shape[1], _coefficients(u, weights)
+        sums = (self.rows.T @ self.rows).toarray().reshape(self.n_bones, 4, self.n_bones, 4)
         self.pairs: Floats = sums.transpose(0, 2, 1, 3)
         """(B, B, 4, 4). sum_i w_ib w_ic (u_i, 1) (u_i, 1)^T."""
-
-    def targets(self, v: Floats) -> Floats:
-        """Return sum_i w_ib v_fi (u_i, 1)^T, (F, B, 3, 4)."""
-        flat = (self.rows.T @ v.transpose(1, 0, 2).reshape(v.shape[1], -1)).reshape(
-            self.n_bones, 4, len(v), 3
-        )
-        return np.asarray(flat.transpose(2, 0, 3, 1))
 
 
 def _transforms(moments: _Moments, v: Floats, start: Floats, sweeps: int) -> Floats:
     """Return better transforms (F, B, 4, 4) for given weights, one bone after the other."""
     moved = start[:, :, :3].copy()
-    targets, pairs = moments.targets(v), moments.pairs
+    targets, pairs = _targets(moments.rows, v), moments.pairs
     linked = np.abs(pairs).sum(axis=(2, 3)) > 0.0
     for _ in range(sweeps):
         for bone in range(moments.n_bones):
@@ -342,7 +384,7 @@ def _transforms(moments: _Moments, v: Floats, start: Floats, sweeps: int) -> Flo
             theirs = moved[:, others].transpose(0, 2, 1, 3).reshape(len(v), 3, -1)
             left = targets[:, bone] - theirs @ pairs[others, bone].reshape(-1, 4)
             moved[:, bone] = _rigid(left, pairs[bone, bone], moved[:, bone, :, :3])
-    return _squared(moved)
+    return affine_matrices(moved[..., :3], moved[..., 3])
 
 
 def _rigid(left: Floats, own: Floats, before: Floats) -> Floats:
@@ -364,20 +406,13 @@ def _rigid(left: Floats, own: Floats, before: Floats) -> Floats:
 
 def _aligned(u: Floats, v: Floats, weights: Floats) -> Floats:
     """Return transforms (F, B, 4, 4), each fitted to the vertices of its weights alone."""
-    padded = np.concatenate([u, np.ones((len(u), 1))], axis=1)
-    targets = np.einsum("ib,fik,ij->fbkj", weights, v, padded, optimize=True)
-    own = np.einsum("ib,ij,ik->bjk", weights, padded, padded, optimize=True)
+    rows = _coefficients(u, weights)
+    targets = _targets(rows, v)
+    own = (rows.T @ np.concatenate([u, np.ones((len(u), 1))], axis=1)).reshape(-1, 4, 4)
     upright = np.tile(np.eye(3), (len(v), 1, 1))
-    found = [_rigid(targets[:, bone], own[bone], upright) for bone in range(weights.shape[1])]
-    return _squared(np.stack(found, axis=1))
-
-
-def _squared(transforms: Floats) -> Floats:
-    """Return transforms (F, B, 3, 4) with the last row of 4 x 4 matrices."""
-    full = np.zeros((*transforms.shape[:2], 4, 4))
-    full[:, :, :3] = transforms
-    full[:, :, 3, 3] = 1.0
-    return full
+    each = range(weights.shape[1])
+    found = np.stack([_rigid(targets[:, bone], own[bone], upright) for bone in each], axis=1)
+    return affine_matrices(found[..., :3], found[..., 3])
 
 
 def _all_transforms(unit: _Unit, rest: Floats, positions: Floats, weights: Floats) -> Floats:
@@ -394,12 +429,11 @@ def _all_transforms(unit: _Unit, rest: Floats, positions: Floats, weights: Float
 
 def _squared_errors(u: Floats, v: Floats, weights: Floats, moved: Floats) -> Floats:
     """Return the squared distances (F, V) of the skinned mesh from its positions."""
-    errors = np.empty(v.shape[:2])
-    for frame in range(len(v)):
-        blended = (weights @ moved[frame, :, :3].reshape(-1, 12)).reshape(-1, 3, 4)
-        skinned = (blended[:, :, :3] @ u[:, :, None])[:, :, 0] + blended[:, :, 3]
-        errors[frame] = ((skinned - v[frame]) ** 2).sum(axis=1)
-    return errors
+    skinned = _coefficients(u, weights) @ moved[:, :, :3].transpose(1, 3, 0, 2).reshape(
+        -1, 3 * len(v)
+    )
+    apart = skinned.reshape(len(u), len(v), 3).transpose(1, 0, 2) - v
+    return np.asarray(np.einsum("fni,fni->fn", apart, apart))
 
 
 def _rows_within(count: int, each: int) -> Iterator[slice]:
