@@ -2,8 +2,7 @@
 processor time of one frame, on the bundled body with and without limits of its arm.
 
 Reachable targets are those of chains whose DOFs move by known angles (the column "path"); walks
-lead beyond reach and to places that limits forbid. Targets are one centimetre apart. "alone" solves
-each target from the start of the drag.
+lead beyond reach and to places that limits forbid. Targets are one centimetre apart.
 """
 
 import sys
@@ -20,7 +19,7 @@ from viewer.loading import bundled_body, load
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import Pose, dof_rotations, rest_pose
-from viewer.rigs.posing.inverse_kinematics import Reaching, chain_above, reach
+from viewer.rigs.posing.inverse_kinematics import Reaching, chain_above
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 STEP, COUNT, SEEDS = 0.01, 250, 4
@@ -42,30 +41,25 @@ def main() -> None:
             known = np.concatenate([_rates(skeleton, path[1], path[0]) for path in paths])
             title = f"{'walk' if is_walk else 'reachable':<10}{name:<14}"
             print(f"{title} path {_text(known) if not is_walk else '-':<12}", end="")
-            for kind in ("drag", "alone"):
-                _report(kind, skeleton, joint, length, starts, paths)
-            print(flush=True)
+            _report(skeleton, joint, length, starts, paths)
 
 
-def _report(kind, skeleton, joint, length, starts, paths) -> None:
+def _report(skeleton, joint, length, starts, paths) -> None:
     rates, left, times = [], [], []
     for (pose, _, _), (targets, _) in zip(starts, paths, strict=True):
         reaching = Reaching(skeleton, pose, joint, length)
         dofs = []
         for target in targets:
             started = time.process_time()
-            if kind == "alone":
-                found = reach(skeleton, pose, joint, target, length, 40)
-            else:
-                found = reaching.follow(target)
+            found = reaching.follow(target)
             times.append(1e3 * (time.process_time() - started))
             dofs.append(found.dofs)
             left.append(100.0 * found.distance)
         rates.append(_rates(skeleton, np.array(dofs), targets))
     mean = np.mean(times)
-    verdict = "" if kind == "alone" or mean <= GOAL else " MISSED"
-    print(f" | {kind} {_text(np.concatenate(rates)):<12} missed {max(left):5.2f} "
-          f"ms {mean:4.1f} / {max(times):4.1f}{verdict}", end="")  # fmt: skip
+    print(f" | drag {_text(np.concatenate(rates)):<12} missed {max(left):5.2f} "
+          f"ms {mean:4.1f} / {max(times):4.1f}{' MISSED' if mean > GOAL else ''}",
+          flush=True)  # fmt: skip
 
 
 def _text(rates: Floats) -> str:

@@ -10,7 +10,7 @@ from viewer.errors import RigError
 from viewer.rigs.constraints.constraint import Constraint
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import dof_rotations, rest_pose
-from viewer.rigs.posing.inverse_kinematics import Reaching, chain_above, position_of, reach
+from viewer.rigs.posing.inverse_kinematics import Reach, Reaching, chain_above, position_of
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 
 NO_LIMIT = (-np.inf, np.inf)
@@ -53,6 +53,16 @@ def drag(skeleton: Skeleton, start: np.ndarray, targets: np.ndarray) -> tuple[np
     return np.array([each.dofs for each in found]), np.array([each.distance for each in found])
 
 
+def reached(skeleton: Skeleton, pose, joint: int, target: np.ndarray, length: int = 2) -> Reach:
+    """Drag a joint to a target at once, and wait until it settles there."""
+    reaching = Reaching(skeleton, pose, joint, length)
+    for _ in range(300):
+        found = reaching.follow(target)
+        if found.is_settled:
+            return found
+    pytest.fail("never settled")
+
+
 def angles_between(skeleton: Skeleton, dofs: np.ndarray) -> np.ndarray:
     """Return the largest angle, degrees, by which a joint rotates from each row to the next."""
     turns = dof_rotations(skeleton, dofs)
@@ -85,7 +95,7 @@ def test_arm_reaches_a_target_by_the_law_of_cosines():
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.3, 0.4
-    found = reach(skeleton, pose, 2, np.array([1.0, 1.0, 0.0]))
+    found = reached(skeleton, pose, 2, np.array([1.0, 1.0, 0.0]))
     assert found.distance < 1e-6
     # |target|^2 = 2 = 2 + 2 cos(elbow), so the elbow is at a right angle.
     assert_allclose(abs(found.dofs[1]), np.pi / 2, atol=1e-5)
@@ -97,21 +107,21 @@ def test_unreachable_target_is_pointed_at_with_a_straight_arm():
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.5, 1.0
-    found = reach(skeleton, pose, 2, np.array([0.0, 5.0, 0.0]), rounds=300)
+    found = reached(skeleton, pose, 2, np.array([0.0, 5.0, 0.0]))
     assert_allclose(found.distance, 3.0, atol=1e-3)
     assert_allclose(hand_at(skeleton, found.dofs), [0, 2, 0], atol=0.05)
 
 
 def test_straight_arm_bends_for_a_target_towards_its_shoulder():
     skeleton = arm()
-    found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]), rounds=200)
+    found = reached(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]))
     assert found.distance < 1e-5
     assert_allclose(abs(found.dofs[1]), 2 * np.pi / 3, atol=1e-4)  # an equilateral triangle
 
 
 def test_elbow_bends_only_to_the_side_that_its_limits_allow():
     skeleton = arm({1: (0.0, 2.5)})
-    found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]), rounds=200)
+    found = reached(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]))
     assert found.distance < 1e-5
     assert_allclose(found.dofs[1], 2 * np.pi / 3, atol=1e-4)
 
@@ -123,17 +133,19 @@ def test_reached_limit_is_reported_and_another_joint_compensates():
     # With the elbow at its limit the hand is sqrt(2 + 2 cos 1) from the shoulder. It can reach any
     # point of that circle, but no point nearer to the shoulder.
     radius = np.sqrt(2 + 2 * np.cos(1.0))
-    found = reach(skeleton, pose, 2, np.array([0.0, 1.0, 0.0]), rounds=300)
-    assert_allclose(found.distance, radius - 1.0, atol=1e-4)
+    found = reached(skeleton, pose, 2, np.array([0.0, 1.0, 0.0]))
+    # A drag settles where a step would bring the hand nearer by less than 0.1 %. The distance is
+    # stationary there, so the angle is off by about the root of that.
+    assert_allclose(found.distance, radius - 1.0, atol=1e-3)
     assert found.limited.tolist() == [1]
-    assert_allclose(found.dofs[0], np.pi / 2 - 0.5, atol=1e-2)
+    assert_allclose(found.dofs[0], np.pi / 2 - 0.5, atol=0.03)
 
 
 def test_start_outside_its_limits_is_clamped():
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[1] = 2.0
-    assert 0 <= reach(skeleton, pose, 2, np.array([2.0, 0, 0])).dofs[1] <= 1
+    assert 0 <= reached(skeleton, pose, 2, np.array([2.0, 0, 0])).dofs[1] <= 1
 
 
 def test_jacobian_matches_finite_differences():
@@ -169,7 +181,7 @@ def test_joint_that_copies_another_bends_with_it():
     skeleton = replace(skeleton, dof_limits=limits, constraints=(Constraint(2, 1, "rotation"),))
     pose = rest_pose(skeleton)
     pose.dofs[5] = 0.2
-    found = reach(skeleton, pose, 3, np.array([2.0, 0, 0]))
+    found = reached(skeleton, pose, 3, np.array([2.0, 0, 0]))
     # Both joints bend by b, so the end is |1 + e^(ib) + e^(2ib)| = 1 + 2 cos b from the first one.
     assert_allclose(found.dofs[5], np.arccos(0.5), atol=1e-5)
 
@@ -185,13 +197,13 @@ def test_chain_has_the_nearest_rotatable_joints():
 
 def test_chain_of_one_does_not_move_the_joints_above_it():
     skeleton = arm()
-    found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 1.0, 0.0]), length=1)
+    found = reached(skeleton, rest_pose(skeleton), 2, np.array([1.0, 1.0, 0.0]), length=1)
     assert_allclose(found.dofs, [0.0, np.pi / 2], atol=1e-5)
 
 
 def test_root_has_no_chain():
     with pytest.raises(RigError, match=r"^no joint above shoulder can rotate$"):
-        reach(arm(), rest_pose(arm()), 0, np.zeros(3))
+        reached(arm(), rest_pose(arm()), 0, np.zeros(3))
 
 
 @pytest.mark.parametrize("seed", range(2))
