@@ -83,6 +83,15 @@ def printable(text: object, limit: int = 200) -> str:
     return shown if len(shown) <= limit else shown[: limit - 1] + "…"
 
 
+def capitalized(text: str) -> str:
+    """Return a text that begins with a capital, as a sentence does.
+
+    >>> capitalized("select a joint in the Rig panel")
+    'Select a joint in the Rig panel'
+    """
+    return text[:1].upper() + text[1:]
+
+
 def quoted(word: bytes | str | None, limit: int = 40) -> Shown:
     r"""Return a word from a file in double quotes, on one line; None is the end of the file.
 

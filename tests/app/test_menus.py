@@ -193,7 +193,7 @@ def test_edit_menu_copies_pastes_mirrors_and_resets_poses(box):
         assert not box.dofs().any()
         box.menu("menu Edit", "Paste pose")
         np.testing.assert_allclose(box.dof("joint_1.x"), np.pi / 4, atol=1e-7)
-    box.menu("menu Edit", "Mirror pose")
+    box.menu("menu Edit", "Mirror pose or joints")
     np.testing.assert_allclose(box.dof("joint_2.x"), np.pi / 4, atol=1e-7)
     box.menu("menu Edit", "Undo")
     assert box.dof("joint_2.x") == 0
@@ -202,7 +202,7 @@ def test_edit_menu_copies_pastes_mirrors_and_resets_poses(box):
 def test_pose_edits_are_greyed_without_a_pose(drive, rig):
     hand = drive(rig[1])
     imgui.set_clipboard_text("kept")
-    for entry in ("Mirror pose", "Copy pose", "Copy pose as raw values", "Paste pose"):
+    for entry in ("Mirror pose or joints", "Copy pose", "Copy pose as raw values", "Paste pose"):
         hand.menu("menu Edit", entry)
         for _ in range(2):
             hand.key("escape")
@@ -453,7 +453,7 @@ def test_undo_with_nothing_to_undo_is_greyed(hand, tooltips):
 def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
     hand = drive(scene=Scene([dots([1, 1, 1, 1])]), samples=1)
     hand.click("menu Edit")
-    for label in ("Mirror pose", "Copy pose", "Paste pose", "New clip"):
+    for label in ("Mirror pose or joints", "Copy pose", "Paste pose", "New clip"):
         rest(hand, label)
         assert tooltips[-1] == "a set of captured points has no joints to pose"
     hand.key("escape")

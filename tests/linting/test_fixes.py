@@ -29,12 +29,13 @@ from viewer.linting import (
     lint_files,
     meshes,
     noise,
+    pops,
     spikes,
     stray_weights,
     symmetry,
     weights,
 )
-from viewer.linting.fixes import FIXES, fix_scene
+from viewer.linting.fixes import FIXES, fix_scene, motions
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
@@ -159,6 +160,23 @@ def test_pop_is_interpolated(is_captured, frames):
     rotations = rotations[:, 3 if is_captured else 0]
     np.testing.assert_allclose(np.abs(np.sum(rotations * about_z(bends), axis=1)), 1.0, atol=1e-4)
     assert "left_elbow" in str(note)
+
+
+def test_run_of_three_popping_frames_is_interpolated_as_a_whole():
+    """Frames 29 and 33 are sound: the angles between them are evenly spaced."""
+    figure, bends = arm(), waving()
+
+    def popping(*degrees):
+        turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+        turns[:, 3] = about_z(bends + np.pad(degrees, (30, FRAMES - 30 - len(degrees))))
+        clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 6, 3)))
+        return Subject(Actor(figure, clip=clip), up=figure.up)
+
+    subject = popping(50.0, 50.0, -50.0)  # one of two frames, and one of a frame behind it
+    (found,) = pops.check(popping(50.0))
+    motions.fix(subject, replace(found, times=np.array([30, 32]) / RATE))
+    wanted = about_z(np.linspace(bends[29], bends[33], 5))
+    np.testing.assert_allclose(subject.actor.clip.rotations[29:34, 3], wanted, atol=1e-9)
 
 
 def test_keys_of_scales_are_deleted():

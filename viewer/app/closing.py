@@ -308,7 +308,7 @@ def _rigs(state: AppState) -> list[_Unsaved]:
     found = [
         _Unsaved(
             f"{printable(actor.name, _LONGEST)}: rig",
-            _for_actor(row, partial(ask_for_export, suffix=".glb")),
+            _for_actor(row, ask_for_export),
         )
         for row, actor in enumerate(state.scene.actors)
         if actor.figure in saved.edited and actor.figure not in saved
@@ -316,8 +316,7 @@ def _rigs(state: AppState) -> list[_Unsaved]:
     if state.of(Rigging).scene is not state.scene:
         return found
     result = shown_result(state)
-    is_edited = result is not None and result.actor.figure in saved.edited
-    if result is None or result in saved or is_edited:
+    if result is None or result in saved:
         return found
     text = f"{printable(result.target.name, _LONGEST)}: rig"
     return [*found, _Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]

@@ -13,7 +13,8 @@ from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import begin_menu, menu_item
 from viewer.app.palette import toggle_palette
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.posing.posing import copy_pose, mirror, paste_pose, reset_actor, reset_joint
+from viewer.app.posing.posing import copy_pose, paste_pose, reset_actor, reset_joint
+from viewer.app.rigging.joint_editing import mirror
 from viewer.app.view.camera_panel import fit_actor, fit_selection
 from viewer.app.view.display_panel import draw_bone_styles, draw_views, toggle_option
 from viewer.app.view.hovering import Picking
@@ -169,7 +170,7 @@ def _draw_actor(state: AppState, spot: Spot) -> None:
     why = "" if actor.pose is not None else "this figure has no joints to pose"
     for text, key, act in (
         ("Reset pose", "", reset_actor),
-        ("Mirror pose", "M", mirror),
+        ("Mirror pose or joints", "M", mirror),
         ("Copy pose", "Ctrl+C", copy_pose),
         ("Paste pose", "Ctrl+V", paste_pose),
     ):

@@ -61,7 +61,7 @@ from viewer.app.view.display_panel import (
 )
 from viewer.app.view.outlines import toggle_outlines
 from viewer.app.weights.weights_panel import toggle_picking, toggle_vertex_info, toggle_weights
-from viewer.phrases import printable
+from viewer.phrases import capitalized, printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN, Shading
 from viewer.rigs.motion.animation_choice import animation_labels
@@ -188,7 +188,7 @@ def _actions(state: AppState) -> Iterator[Entry]:
     for key in KEYS:
         if key.label not in _LEFT_OUT:
             yield Entry(
-                key.text[0].upper() + key.text[1:],
+                capitalized(key.text),
                 "action",
                 key.run,
                 key_name(state, key.label),

@@ -17,9 +17,8 @@ from viewer.app.core.reasons import (
     no_undo,
     nothing_to_export,
 )
-from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
-from viewer.app.core.undo_actions import redo, undo
+from viewer.app.core.undo_actions import redo, redone_next, undo, undone_next
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.editing import new_clip
 from viewer.app.files.files import (
@@ -41,15 +40,17 @@ from viewer.app.posing.posing import (
     ask_for_pose,
     copy_numbers,
     copy_pose,
-    mirror,
     paste_pose,
     reset_pose,
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
+from viewer.app.rigging.joint_editing import mirror
 from viewer.app.view.display_panel import draw_view_menu
 from viewer.formats import opened_text
 from viewer.phrases import printable
+
+_LONGEST = 40  # maximum length of the name of a step
 
 
 def draw_menus(state: AppState) -> None:
@@ -110,13 +111,9 @@ def _draw_file_menu(state: AppState) -> None:
 
 def _draw_items(state: AppState, *actions: Action) -> None:
     for action in actions:
-        if menu_item(state, action.text, action.key, why=action.reason(state)):
+        why, more = action.reason(state), printable(action.more(state), _LONGEST)
+        if menu_item(state, action.text, action.key, why=why, more=more):
             action.run(state)
-
-
-def _ask_for_export(state: AppState) -> None:
-    """Ask where to export the chosen actor, by default with a new rig if it has one."""
-    ask_for_export(state, ".glb" if state.actor.figure in state.of(SavedWork).edited else ".obj")
 
 
 _BUNDLED = (
@@ -125,7 +122,7 @@ _BUNDLED = (
 )
 EXPORTS = (
     Action("Save pose…", ask_for_pose, no_pose),
-    Action("Export…", _ask_for_export, no_job_room),
+    Action("Export…", ask_for_export, no_job_room),
     Action(
         "Export motion…",
         ask_for_motion,
@@ -138,10 +135,13 @@ CHECK = Action("Check the rig", check_rig, no_job_room)
 NEW_CLIP = Action("New clip", new_clip, no_new_clip)
 _SAVING = (*EXPORTS, Action("Save screenshot", want_screenshot, key="F12"))
 _EDITING = (
-    (Action("Undo", undo, no_undo, "Ctrl+Z"), Action("Redo", redo, no_redo, "Ctrl+Shift+Z")),
+    (
+        Action("Undo", undo, no_undo, "Ctrl+Z", undone_next),
+        Action("Redo", redo, no_redo, "Ctrl+Shift+Z", redone_next),
+    ),
     (
         Action("Reset pose", reset_pose, key="R"),
-        Action("Mirror pose", mirror, no_pose, "M"),
+        Action("Mirror pose or joints", mirror, no_pose, "M"),
         NEW_CLIP,
         Action("Copy pose", copy_pose, no_pose, "Ctrl+C"),
         Action("Copy pose as raw values", copy_numbers, no_pose, "Ctrl+Shift+C"),

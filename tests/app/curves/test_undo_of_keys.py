@@ -282,7 +282,7 @@ def test_undo_twice_before_the_next_frame(curves):
     curves.step(1)
     assert_follows_its_clip(curves, 0.75)
     assert_allclose(curves.dofs(), before, atol=1e-12)
-    assert not state.history.can_undo and math.isclose(state.scene.time, 0.75)
+    assert not state.history.undone_next and math.isclose(state.scene.time, 0.75)
 
 
 def test_clip_files_are_loaded_into_the_undoable_state(drive, rig, tmp_path):

@@ -258,7 +258,7 @@ def test_finding_in_a_clip_jumps_to_its_time(lint):
     assert finding.times[0] == pytest.approx(30 / RATE)
     # The camera is aimed at the position of the figure at that time.
     assert hand.state.camera.target[0] == pytest.approx(40.0)
-    assert not hand.state.history.can_undo
+    assert not hand.state.history.undone_next
 
 
 def test_fix_is_one_step_of_undo_and_is_checked_again(lint):
@@ -277,7 +277,7 @@ def test_fix_is_one_step_of_undo_and_is_checked_again(lint):
     hand.step(2)
     assert not unsaved_edits(hand.state)
     assert hand.state.scene.actors[0].figure is LIGHT
-    assert not hand.state.history.can_undo
+    assert not hand.state.history.undone_next
 
 
 def grown() -> Scene:

@@ -213,7 +213,7 @@ def test_redo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
     redone.set()
     assert actor.clip is second[0] and hand.state.job is not None
     hand.finish_job()
-    assert actor.clip is second[0] and actor.drive is second[1] and hand.state.history.can_undo
+    assert actor.clip is second[0] and actor.drive is second[1] and hand.state.history.undone_next
     assert hand.says("the motion was changed meanwhile")
 
 

@@ -19,7 +19,7 @@ from viewer.app.layout import ShownPanels
 from viewer.app.rigging import work
 from viewer.app.rigging.joint_editing import JointEditing
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
-from viewer.app.rigging.results import trial_clip
+from viewer.app.rigging.results import discard, trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.confidence import Finding
@@ -243,6 +243,25 @@ def test_rig_that_is_probably_wrong_is_kept_or_discarded(rigging, texts, monkeyp
         is_kept = answer == "Keep it"
         assert names(hand) == (["scan rigged", "arm", "scan"] if is_kept else ["scan", "arm"])
         assert visible(hand) == (["scan rigged", "arm"] if is_kept else ["scan", "arm"])
+    hand.assert_sane()
+
+
+def test_second_of_two_compared_rigs_is_discarded(rigging):
+    hand = rigging()
+    hand.click("Compare methods")
+    hand.finish_job()
+    results = hand.state.of(Rigging).results
+    before = hand.state.scene.actors.copy()
+    first, second = (results[name] for name in ("robust", "nearest"))
+    target = second.target
+    discard(hand.state, second)
+    hand.step(2)
+    # The target stays behind the first result and the template; the second result was last.
+    assert hand.state.scene.actors == [before[0], before[1], target]
+    assert [*results] == ["robust"] and hand.state.actor is target
+    discard(hand.state, first)
+    hand.step(2)
+    assert hand.state.scene.actors == [target, before[1]] and not results
     hand.assert_sane()
 
 

@@ -56,3 +56,5 @@ class Action:
     """Returns the reason why the action is disabled; empty if it can be run."""
     key: str = ""
     """Label of its key in the table of keys; empty for none."""
+    more: Callable[[AppState], str] = lambda state: ""
+    """Returns what the action applies to now, as shown behind its name in a menu."""

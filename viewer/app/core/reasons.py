@@ -76,12 +76,12 @@ def no_undo(state: AppState) -> str:
     """Return the reason why there is nothing to undo."""
     job = state.job
     is_changing = job is not None and job.is_change and not job.is_cancelled
-    return "" if is_changing or state.history.can_undo else "nothing to undo"
+    return "" if is_changing or state.history.undone_next else "nothing to undo"
 
 
 def no_redo(state: AppState) -> str:
     """Return the reason why there is nothing to redo."""
-    return "" if state.history.can_redo else "nothing to redo"
+    return "" if state.history.redone_next else "nothing to redo"
 
 
 def no_mesh(state: AppState) -> str:

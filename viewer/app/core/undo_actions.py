@@ -6,10 +6,11 @@ from collections.abc import Callable
 from functools import partial
 
 from viewer.app.core.state import AppState
+from viewer.app.core.undo_history import Step
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.scene import Scene
 
-_Step = Callable[[Scene, DisplayOptions, Callable[[float], None]], bool]
+_Go = Callable[[Scene, DisplayOptions, Callable[[float], None]], Step | None]
 """``History.undo`` or ``redo``."""
 
 
@@ -29,12 +30,24 @@ def redo(state: AppState) -> None:
     _go(state, state.history.redo, "Redone", "Nothing to redo")
 
 
-def _go(state: AppState, step: _Step, done: str, none: str) -> None:
-    """Take a step; keep the chosen actor at its new index, or choose another if it is gone."""
+def undone_next(state: AppState) -> str:
+    """Return the name of the step that would be undone."""
+    step = state.history.undone_next
+    return "" if step is None else step.name
+
+
+def redone_next(state: AppState) -> str:
+    """Return the name of the step that would be redone."""
+    step = state.history.redone_next
+    return "" if step is None else step.name
+
+
+def _go(state: AppState, go: _Go, done: str, none: str) -> None:
+    """Undo or redo a step; keep the chosen actor, or choose another if it is gone."""
     before = state.actor
-    is_done = step(state.scene, state.options, partial(state.clock.go_back, chosen=before))
+    step = go(state.scene, state.options, partial(state.clock.go_back, chosen=before))
     # Replaces the message about the change, which would be wrong now.
-    state.say_status(done if is_done else none)
+    state.say_status(none if step is None else f"{done}{step.name and ': '}{step.name}")
     actors, row = state.scene.actors, state.chosen_actor
     if row < len(actors) and actors[row] is before:
         return

@@ -31,11 +31,13 @@ class _Undoable(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class Step:
     """One edit: the states before and after it, both at the time of the edit."""
 
     before: _Snapshot
     after: _Snapshot
+    name: str = ""
+    """What was done, as "move joint left_wrist"; empty if it has no name."""
 
 
 @dataclass(slots=True)
@@ -55,11 +57,13 @@ class History:
     """State of the feature whose value is undone with the scene."""
     first_poses: dict[Actor, PoseKey] = field(default_factory=dict)
     """Poses of actors before their first edit by hand; actors that were not posed are omitted."""
+    name: str = ""
+    """Name of the step that the changes of this frame, or of a drag, become; see ``Step``."""
     _seen: _Snapshot | None = None  # state of the last frame
     _before: _Snapshot | None = None  # state before an edit in progress
     _clocked: dict[Actor, ActorVersion] = field(default_factory=dict)  # as posed by the clock
-    _undo: list[_Step] = field(default_factory=list)
-    _redo: list[_Step] = field(default_factory=list)
+    _undo: list[Step] = field(default_factory=list)
+    _redo: list[Step] = field(default_factory=list)
 
     def start(self, version: SceneVersion, time: float) -> None:
         """Clear the history; the current scene becomes the first state."""
@@ -79,12 +83,15 @@ class History:
             self._before = self._before or self._seen
             # An edit belongs to the time of the poses: the clock may have advanced already.
             self._seen = self._take(version, self._seen.time)
-        if busy or self._before is None:
+        if busy:
+            return False
+        name, self.name = self.name, ""
+        if self._before is None:
             return False
         before, self._before = self._before, None
         if _is_same(before, self._seen):  # dragged back to the initial value
             return False
-        self._undo.append(_Step(before, self._seen))
+        self._undo.append(Step(before, self._seen, name))
         del self._undo[:-_MOST]
         self._redo.clear()
         self._note_poses(before, self._seen)
@@ -167,34 +174,34 @@ class History:
         self._replace(extended)
 
     @property
-    def can_undo(self) -> bool:
-        """Whether there is a step to undo."""
-        return bool(self._undo)
+    def undone_next(self) -> Step | None:
+        """The step that would be undone."""
+        return self._undo[-1] if self._undo else None
 
     @property
-    def can_redo(self) -> bool:
-        """Whether there is a step to redo."""
-        return bool(self._redo)
+    def redone_next(self) -> Step | None:
+        """The step that would be redone."""
+        return self._redo[-1] if self._redo else None
 
-    def undo(self, scene: Scene, options: DisplayOptions, pose_at: _PoseAt) -> bool:
-        """Undo one step; return whether there was one."""
+    def undo(self, scene: Scene, options: DisplayOptions, pose_at: _PoseAt) -> Step | None:
+        """Undo one step and return it; None if there was none."""
         self.observe(self._now(scene, options), busy=False)
         if not self._undo:
-            return False
+            return None
         step = self._undo.pop()
         self._redo.append(step)
         self._go(step.after, step.before, scene, options, pose_at)
-        return True
+        return step
 
-    def redo(self, scene: Scene, options: DisplayOptions, pose_at: _PoseAt) -> bool:
-        """Redo one step; return whether there was one. Parameters are those of ``undo``."""
+    def redo(self, scene: Scene, options: DisplayOptions, pose_at: _PoseAt) -> Step | None:
+        """Redo one step and return it; None if there was none. Parameters are those of ``undo``."""
         self.observe(self._now(scene, options), busy=False)
         if not self._redo:
-            return False
+            return None
         step = self._redo.pop()
         self._undo.append(step)
         self._go(step.before, step.after, scene, options, pose_at)
-        return True
+        return step
 
     def _go(
         self,
@@ -229,7 +236,10 @@ class History:
     def _replace(self, change: Callable[[_Snapshot], _Snapshot]) -> None:
         """Replace every stored state."""
         for steps in (self._undo, self._redo):
-            steps[:] = [_Step(change(step.before), change(step.after)) for step in steps]
+            steps[:] = [
+                replace(step, before=change(step.before), after=change(step.after))
+                for step in steps
+            ]
         self._seen, self._before = (
             None if one is None else change(one) for one in (self._seen, self._before)
         )

@@ -235,11 +235,11 @@ def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
 
 
 def menu_item(
-    state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
+    state: AppState, text: str, key: str = "", checked: bool = False, why: str = "", more: str = ""
 ) -> bool:
     """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
-    shown = key_name(state, key)
-    chosen = imgui.menu_item(text, shown, checked, not why)[0]
+    shown, label = key_name(state, key), f"{text} {more}###{text}" if more else text
+    chosen = imgui.menu_item(label, shown, checked, not why)[0]
     note_item(state, text)
     explain("", why)
     return chosen

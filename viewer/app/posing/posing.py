@@ -10,7 +10,7 @@ from typing import Literal, Protocol, TypeAlias
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.saved_work import SavedPose
+from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
@@ -224,9 +224,10 @@ def save_pose(state: AppState, path: Path) -> None:
         save_files(state, act, [path], _saved(actor))
 
 
-def ask_for_export(state: AppState, suffix: str = ".obj") -> None:
-    """Ask where to export the chosen actor in its current pose."""
+def ask_for_export(state: AppState) -> None:
+    """Ask where to export the chosen actor in its current pose, by default with an edited rig."""
     suffixes = tuple(pose_formats())
+    suffix = ".glb" if state.actor.figure in state.of(SavedWork).edited else ".obj"
     ask_where_to_write(
         state,
         save_export,

@@ -41,7 +41,7 @@ from viewer.errors import OutputError, ViewerError
 from viewer.formats import check_targets, file_stem
 from viewer.linting import Finding, places_of
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
-from viewer.phrases import counted, printable
+from viewer.phrases import capitalized, counted, printable
 from viewer.rendering.framing import frames_looked_at
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
@@ -79,7 +79,7 @@ _WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
 KINDS = {
-    **{suffix: f"{kind.title[0].upper()}{kind.title[1:]}" for suffix, kind in VIDEOS.items()},
+    **{suffix: capitalized(kind.title) for suffix, kind in VIDEOS.items()},
     "pictures": "Numbered pictures (PNG)",
     "sheet": "Contact sheet (PNG)",
 }

@@ -31,7 +31,7 @@ from viewer.autorig.confidence import doubts
 from viewer.autorig.rigged import clip_for
 from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
-from viewer.phrases import printable
+from viewer.phrases import capitalized, printable
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Ints
 from viewer.rigs.comparison.pairs import Pairs, row_distances
@@ -318,7 +318,7 @@ def draw_results(state: AppState) -> None:
     """Draw the choice of version and colours, the statistics of each method, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
-        imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
+        imgui.text_wrapped(f"{capitalized(why)}.")
         return
     _draw_question(state, result)
     shown = _shown_version(state)

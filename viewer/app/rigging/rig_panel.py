@@ -73,7 +73,7 @@ from viewer.autorig.settings import METHODS, TransferMethod
 from viewer.errors import ViewerError
 from viewer.formats import MESHES
 from viewer.loading.placing import placed_like
-from viewer.phrases import printable
+from viewer.phrases import capitalized, printable
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_euler
 from viewer.rigs.geometry.transform import translation_matrix
@@ -113,7 +113,7 @@ def draw(state: AppState) -> None:
     _draw_sources(state)
     why = no_target(state)
     if why:
-        imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
+        imgui.text_wrapped(f"{capitalized(why)}.")
     if _section("Edit skeleton", "joints placed and moved by hand"):
         joint_editing.draw_section(state)
     if rigging.template_key == SHAPE:

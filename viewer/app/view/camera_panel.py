@@ -19,7 +19,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
-from viewer.phrases import printable
+from viewer.phrases import capitalized, printable
 from viewer.rendering.camera import VIEWS, NamedView, front_azimuth, look_from
 from viewer.rendering.camera_views import image_notes, lens_notes
 from viewer.rigs.arrays import Floats
@@ -151,7 +151,7 @@ def look_through(state: AppState, index: int) -> None:
     view = state.scene.views[index]
     look_through_view(state, view)
     for note in (*image_notes(state.scene, view), *lens_notes(state.scene, view)):
-        state.say(note[0].upper() + note[1:])
+        state.say(capitalized(note))
 
 
 def toggle_projection(state: AppState) -> None:
