@@ -1,8 +1,10 @@
 """Section "Edit skeleton": joints placed, dragged, removed and mirrored in the view."""
 
 import threading
+from dataclasses import replace
 
 import numpy as np
+import pytest
 from autorig.rigged_shapes import arm
 from autorig.test_binding import box, joined
 from numpy.testing import assert_allclose
@@ -12,12 +14,16 @@ from viewer.app.closing import unsaved_edits
 from viewer.app.core.view_frame import view_frame
 from viewer.app.posing.posing import save_export
 from viewer.app.rigging.joint_editing import JointEditing
+from viewer.app.rigging.rigging import Rigging
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import TransferSettings
 from viewer.progress import report
 from viewer.rigs.figure import Figure
 from viewer.rigs.joint_edits import rest_worlds
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import ball_skeleton
 from viewer.rigs.skinning import deform
 
 FAR = np.array([300.0, -200.0, 50.0])
@@ -26,18 +32,22 @@ VOXEL = 8.0 / 96  # of the bar
 # Clicks are at whole positions of the pointer, and the middle is found in steps of the ray.
 ATOL = 0.6 * VOXEL
 
+BY_HEAT = TransferSettings("heat", AlignmentSettings(matrix=np.eye(4)))
+
 
 def bar():
     """Return a bar of 8 x 1 x 2 along x, far from the origin; its middle is at ``FAR``."""
     return Figure("bar", joined(box(FAR - HALF, FAR + HALF, (16, 2, 2))))
 
 
-def opened(drive, *figures, start="root"):
+def opened(drive, *figures, start="root", **choices):
     """Return a test driver that edits the first figure, seen along -z without perspective."""
     hand = drive(scene=Scene([Actor(figure) for figure in figures]), size=(1000, 900))
     hand.menu("menu Window", "Rig")
     hand.step(2)
     hand.state.of(JointEditing).start = start
+    rigging = hand.state.of(Rigging)
+    rigging.choices = replace(rigging.choices, **choices)
     hand.click("Edit skeleton")
     hand.finish_job()
     for key in ("_1", "_5", "f"):
@@ -119,6 +129,103 @@ def test_joints_are_placed_in_the_middle_and_weights_follow_a_drag(drive, tmp_pa
     again = viewer.load(path).actors[0].figure
     assert again.skeleton.names == ("root", "joint", "joint_2")
     assert_allclose(rest_worlds(again)[:, :3, 3] - FAR, joints(hand), atol=1e-4)
+
+
+def test_weights_follow_while_a_joint_is_dragged(drive):
+    hand = opened(drive, bar())
+    pull(hand, joints(hand)[0], (-3.0, 0.0, 0.0))
+    click(hand, 0.0, 0.0, 1.0)
+    before, steps = figure(hand), hand.undo_steps
+    x = before.mesh.positions[:, 0] - FAR[0]
+
+    def hold(*places):
+        hand.move(seen(hand, *joints(hand)[1]))
+        hand.press()
+        for place in places:
+            hand.move(seen(hand, place, 0.0, 0.0))
+            hand.step(2)
+            hand.finish_job()
+            # The bone from -3 to the joint moves what is beside it.
+            assert (strongest(hand)[x < place - 0.4] == 0).all()
+            assert (strongest(hand)[x > place + 0.4] == 1).all()
+            assert_allclose(joints(hand)[1], [place, 0, 0], atol=ATOL)
+        assert hand.undo_steps == steps
+
+    hold(2.0, -1.0)
+    hand.key("escape")
+    hand.let_go()
+    hand.step(2)
+    assert figure(hand) is before and hand.undo_steps == steps and not hand.state.job
+    hold(1.5)
+    hand.let_go()
+    hand.step(2)
+    assert hand.undo_steps == steps + 1 and not hand.state.job  # bound before the release
+    hand.menu("menu Edit", "Undo")
+    assert figure(hand).skeleton is before.skeleton and hand.says("Undone: move joint joint")
+    undo(hand, "ctrl shift")
+    assert_allclose(joints(hand)[1], [1.5, 0, 0], atol=ATOL)
+    assert hand.says("Redone: move joint joint")
+
+
+def test_newest_place_is_bound_where_binding_takes_long(drive, monkeypatch):
+    hand = opened(drive, bar())
+    gate, bound = threading.Event(), []
+
+    def waiting(template, *arguments):
+        bound.append(rest_worlds(template)[0, 0, 3] - FAR[0])
+        while not gate.wait(0.005):
+            report(1, 2)  # raises once the job is cancelled
+        return transfer(template, *arguments)
+
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.transfer", waiting)
+    hand.move(seen(hand, *joints(hand)[0]))
+    hand.press()
+    for place in (1.0, 2.0, 3.0):
+        hand.move(seen(hand, place, 0.0, 0.0))
+        hand.step(2)
+    hand.let_go()
+    while len(bound) < 2:
+        hand.step()
+    gate.set()
+    hand.finish_job()
+    assert_allclose(bound, [1.0, 3.0], atol=ATOL)  # the second one was never begun
+    assert figure(hand) not in hand.state.of(JointEditing).stale
+
+
+@pytest.mark.usefixtures("quick_fits")
+def test_other_joints_are_fitted_to_those_placed_by_hand(drive, monkeypatch):
+    """The template is a bar of half the size with joints at -2, 0 and 2: all scale with two."""
+    above = FAR + np.array([0.0, 3.0, 0.0])
+    places = above + np.array([[-2.0, 0, 0], [0, 0, 0], [2, 0, 0]])
+    skeleton = ball_skeleton(("root", "middle", "end"), np.array([-1, 0, 1], np.int32), places)
+    mesh = joined(box(above - 0.5 * HALF, above + 0.5 * HALF, (16, 2, 2)))
+    template = transfer(Figure("t", None, skeleton), rest_pose(skeleton), mesh, BY_HEAT).figure
+    hand = opened(drive, bar(), template, start="template", fits=False, facing="z")
+    assert names(hand) == ("root", "middle", "end")
+    assert hand.state.of(JointEditing).fit is not None
+    hand.click("Fit the other joints")
+    assert not hand.state.job  # no joint was moved yet
+    hand.state.of(JointEditing).choices.weights = "keep"
+    assert_allclose(joints(hand), [[-4, 0, 0], [0, 0, 0], [4, 0, 0]], atol=1e-3)
+    pull(hand, joints(hand)[0], (-3.0, 0.0, 0.0), held="ctrl")
+    pull(hand, joints(hand)[2], (3.4, 0.1, 0.0), held="ctrl")
+    pull(hand, joints(hand)[1], (0.2, 0.3, 0.0), held="ctrl")
+    undo(hand)  # no longer placed by hand
+    steps, kept = hand.undo_steps, {}
+
+    def fitted(_template, mesh, places, held):
+        kept.update({name: places[name] for name in held})
+        return {"root": FAR, "middle": FAR + np.array([0.5, 0.25, 0.0]), "end": FAR}
+
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.fit_again", fitted)
+    hand.click("Fit the other joints")
+    hand.finish_job()
+    assert set(kept) == {"root", "end"}
+    assert_allclose(joints(hand), [[-3, 0, 0], [0.5, 0.25, 0], [3.4, 0.1, 0]], atol=2 * ATOL)
+    assert_allclose([kept["root"], kept["end"]], joints(hand)[[0, 2]] + FAR, atol=1e-9)
+    assert hand.undo_steps == steps + 1
+    undo(hand)
+    assert hand.says("Undone: fit the other joints")
 
 
 def test_symmetric_edits_mirroring_and_removal(drive):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import field, replace
 from typing import TypeAlias
-from weakref import WeakSet
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 from imgui_bundle import imgui
@@ -40,11 +40,12 @@ from viewer.app.posing.posing import Posing
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import (
     Rigging,
+    Template,
     choose_target,
     target_mesh,
     targets,
 )
-from viewer.app.rigging.work import aligned_start, begin_work
+from viewer.app.rigging.work import aligned_start, begin_work, fit_again
 from viewer.app.view.hovering import Picking
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.anatomy import sagittal_plane
@@ -56,12 +57,13 @@ from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.exporters._rigged_files import USUAL_INFLUENCES
-from viewer.phrases import counted, listed, printable
+from viewer.phrases import capitalized, counted, listed, printable
 from viewer.progress import report
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.transform import apply_transform, translation_matrix
 from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.inspection.front import guess_front
 from viewer.rigs.joint_edits import (
     Plane,
@@ -86,7 +88,7 @@ from viewer.rigs.pose import Pose, placement_matrix, rest_pose
 from viewer.rigs.retargeting.joint_names import other_side, sided_words
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.shape import shaped_skeleton
-from viewer.rigs.skeleton import ball_skeleton, joint_label
+from viewer.rigs.skeleton import Skeleton, ball_skeleton, joint_label
 from viewer.rigs.skin import Skin
 from viewer.rigs.skinning import posed_mesh
 
@@ -95,9 +97,6 @@ _WEIGHTS: dict[str, str] = {
     "voxel": "voxel: bind again",
     "keep": "keep the weights",
 }
-_Start: TypeAlias = Callable[[], tuple[Figure, Floats | None, list[str]]]
-"""Computes, in a thread, the figure to edit, its placement in the scene (None to keep that), and
-the names of what it lacks of the former one."""
 _NOT_KEPT = "Not kept with other joints: {}"
 _STILL = 2.0  # maximum movement of the pointer during a click, window coordinates
 _LONGEST = 40  # maximum length of a name in messages
@@ -107,6 +106,23 @@ _AS_WIDE = 0.9  # distance from the surface relative to the largest
 _SAME = 1e-9  # distance of the mesh at rest from the bind pose that is rounding, of its size
 _rest_meshes: Memo[Figure, Mesh] = Memo()
 _planes: Memo[Mesh, Plane] = Memo()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Begun:
+    """A figure to edit."""
+
+    figure: Figure
+    place: Floats | None = None
+    """Its placement in the scene; None to keep the former one."""
+    lost: tuple[str, ...] = ()
+    """Names of what it lacks of the former figure."""
+    template: Template | None = None
+    """The template that was fitted, as it was before."""
+
+
+_Start: TypeAlias = Callable[[], _Begun]
+"""Computes the figure to edit, in a thread."""
 
 
 @dataclass(slots=True)
@@ -123,11 +139,17 @@ class JointDrag:
 
     joint: int
     figure: Figure
-    """The figure that it belongs to; undo may replace it."""
+    """The figure before the drag."""
+    skeleton: Skeleton
+    """The joints that are shown; undo may replace them."""
     place: Place
     """Position of the pointer at the start, window coordinates."""
+    held: frozenset[str] = frozenset()
+    """Names of the joint and, in symmetric editing, of its counterpart."""
     places: dict[int, Floats] = field(default_factory=dict)
     """New places (3,) of joints, figure space."""
+    bound: dict[int, Floats] = field(default_factory=dict)
+    """Those of the shown joints, for which the mesh is bound."""
     has_moved: bool = False
     is_over: bool = False
     """Whether it was cancelled and only waits for the release of the button."""
@@ -157,6 +179,10 @@ class JointEditing:
     """The reason why."""
     name: tuple[object, str] = (None, "")
     """Name that is being typed, and the joint that gets it."""
+    fit: tuple[Actor, Template] | None = None
+    """The last actor that got a fitted template, and the template as it was before."""
+    placed: WeakKeyDictionary[Skeleton, frozenset[str]] = field(default_factory=WeakKeyDictionary)
+    """Names of the joints that were placed by hand, which another fit of the template keeps."""
 
 
 # Conditions
@@ -267,17 +293,17 @@ def start_editing(state: AppState) -> None:
     take = _STARTS[start](state, actor)
 
     def act() -> Callable[[AppState], None]:
-        figure, place, lost = take()
-        mesh = rest_mesh(figure)
+        begun = take()
+        mesh = rest_mesh(begun.figure)
         report(90, 100, "", "Looking for the plane of symmetry")
-        _plane_of(figure, mesh)  # so that no click has to wait for it
-        return lambda state: _enter(state, actor, figure, place, lost)
+        _plane_of(begun.figure, mesh)  # so that no click has to wait for it
+        return lambda state: _enter(state, actor, begun)
 
     begin_work(state, "Finding joints", act)
 
 
 def _own_joints(_state: AppState, actor: Actor) -> _Start:
-    return lambda: (actor.figure, None, [])
+    return lambda: _Begun(actor.figure)
 
 
 def _fitted_template(state: AppState, actor: Actor) -> _Start:
@@ -287,8 +313,9 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
     how = _weight_settings(state)
     start = aligned_start(state)
 
-    def act() -> tuple[Figure, Floats, list[str]]:
-        template, similarity = start()
+    def act() -> _Begun:
+        found = start()
+        template, similarity = found.fitted, found.similarity
         pose, settings = template.pose, AlignmentSettings()
         skeleton = shaped_skeleton(template.figure, pose.shape_weights)
         if similarity is not None and not similarity.is_plain:
@@ -308,7 +335,9 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
         rigged = transfer(joints, plain, mesh, TransferSettings("heat", settings, how), name)
         rest = at_rest(rigged.figure.require_skeleton(), rigged.pose)
         figure = replace(rigged.figure, skeleton=rest, hands=(), pose_layout=None, fields=())
-        return figure, place @ rigged.placement, []
+        fits = found.template.figure.is_attached
+        matrix = place @ rigged.placement
+        return _Begun(figure, matrix, template=found.template if fits else None)
 
     return act
 
@@ -317,7 +346,7 @@ def _single_root(state: AppState, actor: Actor) -> _Start:
     """Put one joint where the solid is widest, near its plane of symmetry."""
     figure = actor.figure
 
-    def act() -> tuple[Figure, None, list[str]]:
+    def act() -> _Begun:
         report(0, 100, "", "Looking for the middle")
         mesh = rest_mesh(figure)
         plane, solid = _plane_of(figure, mesh), enclosed(mesh)[1]
@@ -345,7 +374,8 @@ def _single_root(state: AppState, actor: Actor) -> _Start:
             lost.append(counted(shapes.n_shapes, "blend shape"))
             bare = replace(bare, blend_shapes=None)
         bare = replace(bare, joint_regressor=None, parameters=None)
-        return replace(bare, mesh=mesh, skeleton=skeleton, skin=skin), None, lost
+        found = replace(bare, mesh=mesh, skeleton=skeleton, skin=skin)
+        return _Begun(found, lost=tuple(lost))
 
     return act
 
@@ -357,24 +387,25 @@ _STARTS: dict[str, Callable[[AppState, Actor], _Start]] = {
 }
 
 
-def _enter(
-    state: AppState, actor: Actor, figure: Figure, place: Floats | None, lost: list[str]
-) -> None:
+def _enter(state: AppState, actor: Actor, begun: _Begun) -> None:
     """Show a figure in place of an actor's own, at rest, and let the mouse edit its joints."""
-    editing = state.of(JointEditing)
+    editing, figure = state.of(JointEditing), begun.figure
     row = next((row for row, one in enumerate(state.scene.actors) if one is actor), -1)
     if row < 0:
         state.say("The figure to edit no longer exists")
         return
     if actor.clip is not None:
         state.say("The motion was stopped: joints are edited at rest")
-    if lost:
-        state.say(_NOT_KEPT.format(listed(lost, 8)))
+    if begun.lost:
+        state.say(_NOT_KEPT.format(listed(begun.lost, 8)))
     actor.clip, actor.animation, actor.drive, actor.springs = None, -1, None, None
     if figure is not actor.figure:
         state.of(SavedWork).edited.add(figure)
-    if place is not None:
-        actor.placement, actor.pose = place, None
+        state.history.name = "find joints"
+    if begun.place is not None:
+        actor.placement, actor.pose = begun.place, None
+    if begun.template is not None:
+        editing.fit = actor, begun.template
     _show(actor, figure)
     if row != state.chosen_actor:
         state.choose_actor(row)
@@ -411,10 +442,30 @@ def stop_editing(state: AppState) -> bool:
 # Edits
 
 
-def _commit(state: AppState, figure: Figure, text: str, selected: int | None = None) -> None:
-    """Show an edited figure, and have its mesh bound unless its weights are kept."""
-    editing, actor = state.of(JointEditing), edited(state)
+def _commit(
+    state: AppState,
+    figure: Figure,
+    name: str,
+    selected: int | None = None,
+    held: frozenset[str] = frozenset(),
+) -> None:
+    """Show an edited figure as a step of the undo history with a name; see ``_put_joints``."""
+    actor = edited(state)
     assert actor is not None  # checked by the callers
+    _put_joints(state, actor, figure, held)
+    if selected is not None:
+        state.selected_joint = -1
+        select_joint(state, selected)
+    state.history.name = name
+    state.say_status(capitalized(name))
+
+
+def _put_joints(state: AppState, actor: Actor, figure: Figure, held: frozenset[str]) -> None:
+    """Show an edited figure, and have its mesh bound unless its weights are kept.
+
+    ``held``: names of the joints that were placed by hand.
+    """
+    editing, before = state.of(JointEditing), actor.figure.require_skeleton()
     figure, lost = prepared(figure)
     _keep_rest_mesh(figure, rest_mesh(actor.figure))
     if lost:
@@ -423,10 +474,9 @@ def _commit(state: AppState, figure: Figure, text: str, selected: int | None = N
     state.of(SavedWork).edited.add(figure)
     if editing.choices.weights != "keep":
         editing.stale.add(figure)
-    if selected is not None:
-        state.selected_joint = -1
-        select_joint(state, selected)
-    state.say_status(text)
+    skeleton = figure.require_skeleton()
+    placed = editing.placed.get(before, frozenset()) | held
+    editing.placed[skeleton] = placed & frozenset(skeleton.names)
 
 
 def _label(figure: Figure, joint: int) -> str:
@@ -461,30 +511,85 @@ def delete_joint(state: AppState) -> None:
         figure, joint = actor.figure, state.selected_joint
         chosen, plane = {joint}, _symmetry(state, figure)
         if plane is not None:
-            chosen |= {other for other in (partners(figure, plane)[joint],) if other >= 0}
+            chosen |= {partners(figure, plane)[joint]} - {-1}
         above = int(figure.require_skeleton().parents[joint])
         above = next((one for one in (above, 0) if one >= 0 and one not in chosen), -1)
         left = removed(figure, chosen)
         names = " and ".join(_label(figure, one) for one in sorted(chosen))
         row = above - sum(one < above for one in chosen)
-        _commit(state, left, f"Removed: {names}", max(row, 0))
+        _commit(state, left, f"remove joint {names}", max(row, 0))
 
     _tried(state, edit)
 
 
 def mirror(state: AppState) -> None:
     """Mirror the selected chain while joints are edited, or else the pose."""
-    if edited(state) is None:
+    if edited(state) is not state.actor:
         posing.mirror(state)
         return
 
     def edit(actor: Actor) -> None:
         figure, joint = actor.figure, state.selected_joint
-        plane = _plane_of(figure, rest_mesh(figure))
-        text = f"Mirrored: {_label(figure, joint)} and the joints below it"
-        _commit(state, mirrored(figure, joint, plane), text)
+        plane, skeleton = _plane_of(figure, rest_mesh(figure)), figure.require_skeleton()
+        placed = state.of(JointEditing).placed.get(skeleton, frozenset())
+        chain = np.flatnonzero(descendants(skeleton.parents, joint)).tolist()
+        images = {other_side(skeleton.names[one]) for one in chain if skeleton.names[one] in placed}
+        new, name = mirrored(figure, joint, plane), f"mirror joint {_label(figure, joint)}"
+        _commit(state, new, name, held=frozenset(images))
 
     _tried(state, edit)
+
+
+def fitted_template(state: AppState) -> Template | None:
+    """Return the template that was fitted to the edited mesh, None if there is none."""
+    fit = state.of(JointEditing).fit
+    return fit[1] if fit is not None and fit[0] is edited(state) else None
+
+
+def no_refit(state: AppState) -> str:
+    """Return the reason why the template cannot be fitted to joints placed by hand."""
+    template, actor = fitted_template(state), edited(state)
+    if template is None or actor is None:
+        return 'start from "template, fitted"'
+    skeleton = actor.figure.require_skeleton()
+    placed = state.of(JointEditing).placed.get(skeleton, frozenset())
+    if not placed & frozenset(template.figure.require_skeleton().names):
+        return "move a joint first"
+    return no_job_room(state)
+
+
+def refit(state: AppState) -> None:
+    """Fit the template again, with the joints where they were placed by hand, as one step."""
+    template, actor, why = fitted_template(state), edited(state), no_refit(state)
+    if why or template is None or actor is None:
+        state.say_status(f"Edit skeleton: {why}")
+        return
+    figure, skeleton = actor.figure, actor.figure.require_skeleton()
+    known = frozenset(template.figure.require_skeleton().names)
+    placed = state.of(JointEditing).placed[skeleton] & known
+    places = dict(zip(skeleton.names, rest_worlds(figure)[:, :3, 3], strict=True))
+    mesh = rest_mesh(figure)
+
+    def act() -> Callable[[AppState], None]:
+        found = fit_again(template, mesh, places, placed)
+
+        def finish(state: AppState) -> None:
+            if edited(state) is not actor or actor.figure.skeleton is not skeleton:
+                state.say("Not fitted: the joints were edited meanwhile")
+                return
+            new = dict[int, Floats]()
+            for joint, (name, above) in enumerate(
+                zip(skeleton.names, skeleton.parents.tolist(), strict=True)
+            ):
+                place = places[name]
+                # Joints that the template does not have move with those above them.
+                along = new[above] - places[skeleton.names[above]] if above >= 0 else 0.0
+                new[joint] = place if name in placed else found.get(name, place + along)
+            _commit(state, moved(figure, new), "fit the other joints")
+
+        return finish
+
+    begin_work(state, "Fitting the template", act)
 
 
 def rename_joint(state: AppState, name: str) -> None:
@@ -498,7 +603,7 @@ def rename_joint(state: AppState, name: str) -> None:
         if other >= 0 and other != joint and other_side(name):
             new = renamed(new, other, other_side(name))
         is_stale = figure in state.of(JointEditing).stale
-        _commit(state, new, f"Renamed: {old} is now {printable(name, _LONGEST)}")
+        _commit(state, new, f"rename joint {old} to {printable(name, _LONGEST)}")
         if not is_stale:
             state.of(JointEditing).stale.discard(actor.figure)  # the weights are the same
 
@@ -523,7 +628,7 @@ def _add_at(state: AppState, actor: Actor, place: Floats) -> None:
         )
         new = added(new, parent, place, f"{base}_{sides[0]}")
     last = new.require_skeleton().n_joints - 1
-    _commit(state, new, f"Added: {_label(new, last)} below {_label(figure, parent)}", last)
+    _commit(state, new, f"add joint {_label(new, last)} below {_label(figure, parent)}", last)
 
 
 def _take_click(state: AppState, actor: Actor) -> None:
@@ -583,7 +688,11 @@ def hold_joint(state: AppState) -> bool:
     joint = joint_at(state, place)
     if joint < 0:
         return False
-    editing.drag = JointDrag(joint, actor.figure, place)
+    figure, plane = actor.figure, _symmetry(state, actor.figure)
+    skeleton = figure.require_skeleton()
+    other = -1 if plane is None else partners(figure, plane)[joint]
+    held = frozenset(skeleton.names[one] for one in (joint, other) if one >= 0)
+    editing.drag = JointDrag(joint, figure, skeleton, place, held)
     return True
 
 
@@ -592,7 +701,7 @@ def _go_on(state: AppState, drag: JointDrag, at: Place) -> None:
     editing, actor, io = state.of(JointEditing), edited(state), imgui.get_io()
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_joint_drag(state)
-    if actor is None or actor.figure.skeleton is not drag.figure.skeleton:
+    if actor is None or actor.figure.skeleton is not drag.skeleton:
         drag.is_over = True  # undone, or closed
     if drag.is_over or actor is None:
         editing.drag = drag if imgui.is_mouse_down(_LEFT) else None
@@ -606,15 +715,40 @@ def _go_on(state: AppState, drag: JointDrag, at: Place) -> None:
     if state.selected_joint != drag.joint:
         select_joint(state, drag.joint)
     if drag.places:
-        text = f"Moved: {_label(actor.figure, drag.joint)}"
-        _tried(state, lambda actor: _commit(state, moved(actor.figure, drag.places), text))
+        if not _is_bound_there(drag):
+            _stop_binding(state)  # the last places count
+            _tried(state, lambda actor: _show_dragged(state, actor, drag))
+        name = f"move joint {_label(actor.figure, drag.joint)}"
+        state.history.name = name
+        state.say_status(capitalized(name))
+
+
+def _is_bound_there(drag: JointDrag) -> bool:
+    """Return whether the joints are shown where they are dragged to."""
+    places, bound = drag.places, drag.bound
+    is_same = places.keys() == bound.keys()
+    return is_same and all(np.array_equal(places[one], bound[one]) for one in places)
+
+
+def _show_dragged(state: AppState, actor: Actor, drag: JointDrag) -> None:
+    """Show the joints where they are dragged to; the mesh is then bound to them."""
+    # All others where they were, for the modifiers may have moved them meanwhile.
+    places = dict(enumerate(rest_worlds(drag.figure)[:, :3, 3])) | drag.places
+    _put_joints(state, actor, moved(actor.figure, places), drag.held)
+    drag.skeleton, drag.bound = actor.figure.require_skeleton(), drag.places
+
+
+def _stop_binding(state: AppState) -> None:
+    """Cancel the job that binds the mesh, if there is one."""
+    if state.of(JointEditing).binding is not None and state.job is not None:
+        state.job.cancel()
 
 
 def _dragged_places(
     state: AppState, actor: Actor, drag: JointDrag, at: Place, snaps: bool, alone: bool
 ) -> dict[int, Floats]:
     """Return the new places of the held joint and of those that move with it, figure space."""
-    figure, frame = actor.figure, view_frame(state)
+    figure, frame = drag.figure, view_frame(state)
     matrix = _figure_place(actor)
     start = apply_transform(matrix, rest_worlds(figure)[drag.joint, :3, 3])
     wanted = dragged(start, drag.place, frame, at)
@@ -636,9 +770,12 @@ def _dragged_places(
 
 def cancel_joint_drag(state: AppState) -> bool:
     """Cancel a drag; return whether there was one."""
-    drag = state.of(JointEditing).drag
+    drag, actor = state.of(JointEditing).drag, edited(state)
     if drag is None or drag.is_over:
         return False
+    if drag.bound and actor is not None and actor.figure.skeleton is drag.skeleton:
+        _stop_binding(state)
+        _show(actor, drag.figure)
     drag.is_over, drag.places = True, {}
     state.say_status("Drag cancelled")
     return True
@@ -663,7 +800,8 @@ def update_joints(state: AppState) -> None:
         return
     if state.actor is actor and state.selected_joint >= skeleton.n_joints:
         state.selected_joint = -1
-    if editing.is_on and (state.actor is not actor or _is_posed(actor, pose)):
+    poses = state.of(Posing).is_on or state.actor is not actor or _is_posed(actor, pose)
+    if editing.is_on and poses:
         stop_editing(state)
         state.say_status("Edit skeleton is off: it edits the chosen figure at rest")
     if editing.is_on:
@@ -689,11 +827,15 @@ def _weight_settings(state: AppState) -> WeightSettings:
 
 def _bind(state: AppState, actor: Actor) -> None:
     """Start a job that binds the mesh to its joints, if they were edited since."""
-    editing, figure = state.of(JointEditing), actor.figure
+    editing, drag = state.of(JointEditing), state.of(JointEditing).drag
     if editing.binding is not None and state.of(Rigging).running is None:
         # The job has ended without a result.
         editing.refused, editing.binding = editing.binding, None
         editing.problem = "binding was cancelled"
+    is_free = editing.choices.weights != "keep" and not no_job_room(state)
+    if drag is not None and drag.places and is_free and not _is_bound_there(drag):
+        _show_dragged(state, actor, drag)  # one binding at a time, for the newest places
+    figure = actor.figure
     if figure not in editing.stale or figure is editing.refused or no_job_room(state):
         return
     method = next((name for name in BINDING if name == editing.choices.weights), None)
@@ -742,7 +884,7 @@ def _put_weights(
     _keep_rest_mesh(new, mesh)
     state.of(SavedWork).edited.add(new)
     editing.problem = ""
-    state.observe()
+    state.observe(busy=editing.drag is not None)
     state.history.exchange_figure(figure, new)
     actor.figure = new
     state.update_version()
@@ -789,7 +931,7 @@ def draw_section(state: AppState) -> None:
     """Draw the controls of the section "Edit skeleton" of the Rig panel."""
     editing, actor = state.of(JointEditing), subject(state)
     why = no_subject(state)
-    imgui.text_wrapped(printable(actor.name, 60) if not why else f"{why[0].upper()}{why[1:]}.")
+    imgui.text_wrapped(printable(actor.name, 60) if not why else f"{capitalized(why)}.")
     if edited(state) is None:
         known = starts(state) or {"": "none"}
         if editing.start not in known:
@@ -809,6 +951,10 @@ def draw_section(state: AppState) -> None:
     text = "edits apply to both sides; joints in the middle stay in the plane of symmetry"
     draw_setting(state, "Symmetric", editing.choices, "symmetric", text)
     _draw_joint(state, actor)
+    if fitted_template(state) is not None:
+        if button(state, "Fit the other joints", no_refit(state)):
+            refit(state)
+        explain("fit the template again; the joints that were moved by hand stay", no_refit(state))
     if button(state, "Done###edit done"):
         stop_editing(state)
     explain(with_key(state, "pose the figure with the tools; File > Export saves it", "Esc"))
@@ -852,7 +998,7 @@ def _draw_weights(state: AppState, actor: Actor) -> None:
     """Draw whether the weights fit the joints."""
     editing, figure = state.of(JointEditing), actor.figure
     if figure is editing.refused and editing.problem:
-        warning(f"{editing.problem[0].upper()}{editing.problem[1:]}")
+        warning(capitalized(editing.problem))
     if figure not in editing.stale or editing.choices.weights == "keep":
         is_edited = figure in state.of(SavedWork).edited
         imgui.text_disabled("weights: up to date" if is_edited else "weights: as read")
@@ -869,4 +1015,4 @@ def _bind_again(state: AppState) -> None:
     editing, actor = state.of(JointEditing), edited(state)
     if actor is not None:
         editing.refused = None
-        _commit(state, actor.figure, f"Binding by {editing.choices.weights}")
+        _commit(state, actor.figure, f"bind by {editing.choices.weights}")

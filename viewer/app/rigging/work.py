@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,8 +30,10 @@ from viewer.app.rigging.rigging import (
     target_mesh,
     template_files,
 )
+from viewer.autorig.alignment.anatomy_fit import left_of
+from viewer.autorig.alignment.orientation_search import AXES, axis_direction
 from viewer.autorig.alignment.posed_alignment import align_posed
-from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.alignment.surface_alignment import (
     AlignmentSettings,
     alignment_lines,
@@ -46,6 +48,7 @@ from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import SkeletonSettings, TransferMethod, TransferSettings
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import WeightSettings
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.loading import load
 from viewer.loading.placing import placed_like
@@ -59,7 +62,7 @@ from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.scene import Actor, free_title
 from viewer.rigs.shape import shaped
-from viewer.rigs.skinning import deform
+from viewer.rigs.skinning import deform, joint_matrices
 
 _Finish = Callable[[AppState], None]
 _CALLED: dict[TransferMethod, str] = {
@@ -251,26 +254,62 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
     )
 
 
-def aligned_start(state: AppState) -> Callable[[], tuple[Template, Similarity | None]]:
-    """Return a function that gives a thread the template, aligned with the target if necessary.
+@dataclass(frozen=True, slots=True, eq=False)
+class AlignedStart:
+    """A template at its target."""
 
-    Its second result maps the template to the target; None for a skeleton without a mesh, which is
-    used where it is or where it fits.
-    """
+    template: Template
+    """As chosen."""
+    fitted: Template
+    """With rotated joints and resized limbs; the same object if it fits unchanged."""
+    similarity: Similarity | None
+    """Maps it to the target; None for a skeleton without a mesh, which is used where it is or where
+    it fits."""
+
+
+def aligned_start(state: AppState) -> Callable[[], AlignedStart]:
+    """Return a function that gives a thread the template, aligned with the target if necessary."""
     take, known, own = _snapshot(state, aligned=True), placing_now(state), current_template(state)
     mesh, settings = target_mesh(state), _search_settings(state)
     fits = state.of(Rigging).choices.fits
 
-    def act() -> tuple[Template, Similarity | None]:
+    def act() -> AlignedStart:
         template, found = take(), known
         if not template.figure.is_attached:
-            return template, None
+            return AlignedStart(template, template, None)
         if found is None:
             with part_of_work("Aligning", (0.0, 0.7)):
                 found = align_template(template, own or template, mesh, settings, fits)
-        return found.fitted or template, found.similarity
+        return AlignedStart(own or template, found.fitted or template, found.similarity)
 
     return act
+
+
+def fit_again(
+    template: Template, target: Mesh, places: Mapping[str, Floats], held: Collection[str]
+) -> dict[str, Floats]:
+    """Fit a template again, with some of its joints where they are; return the places (3,) of all.
+
+    ``places``: of all joints of the rigged target, by name; ``held``: those that stay.
+    """
+    figure, pose = _unshaped(template)
+    names = figure.require_skeleton().names
+    own = dict(zip(names, joint_matrices(figure, pose)[:, :3, 3], strict=True))
+    both = np.array([[own[name], places[name]] for name in names if name in places])
+    turn = fit_similarity(both[:, 0], both[:, 1]).rotation
+    up = axis_direction(figure.up)
+    ahead = np.cross(left_of(figure, pose), up)
+    marks = np.array([[own[name], places[name]] for name in held])
+    # The present joints show which way the target faces.
+    how = AlignmentSettings(up=_axis(turn @ up), facing=_axis(turn @ ahead), landmarks=marks)
+    found = align_posed(figure, pose, target, how, fits=True)
+    joints = joint_matrices(found.figure, found.pose)[:, :3, 3]
+    return dict(zip(names, found.alignment.similarity.apply(joints), strict=True))
+
+
+def _axis(way: Floats) -> str:
+    """Return the axis nearest to a direction (3,)."""
+    return max(AXES, key=lambda name: float(way @ axis_direction(name)))
 
 
 def start_match(state: AppState) -> None:
