@@ -97,7 +97,7 @@ ALLOWED_IN_APP = {
     "manual": {"core", "manual"},
     "palette": {"core", "palette"},
     "context_menu": {
-        *("core", "actors", "posing", "weights", "view", "palette", "context_menu"),
+        *("core", "actors", "posing", "weights", "view", "palette", "rigging", "context_menu"),
     },
     "linting": {"core", "layout", "playback", "view", "linting"},
     "retargeting": {"core", "files", "retargeting"},
