@@ -7,7 +7,7 @@ import pytest
 from autorig.moving_shapes import two_boxes, write_frames
 
 from viewer.errors import ViewerError
-from viewer.loading.mesh_sequence import frame_numbers, read_mesh_sequence
+from viewer.loading.mesh_sequence import frame_numbers, read_mesh_sequence, stores_frames
 
 POSITIONS, FACES = two_boxes()
 
@@ -100,3 +100,75 @@ def test_invalid_numbers_unknown_bind_frames_and_missing_faces_are_refused(tmp_p
         read_mesh_sequence(paths)
     with pytest.raises(ViewerError, match=r"dots_1.obj: expected faces, found none"):
         read_mesh_sequence(write_frames(tmp_path, "dots", POSITIONS, []))
+
+
+def saved(folder, name="walk.npz", **arrays):
+    path = folder / name
+    np.savez_compressed(path, **arrays)
+    return path
+
+
+@pytest.mark.parametrize("names", [("vertices", "faces"), ("verts", "f"), ("points", "triangles")])
+def test_archive_has_all_frames(tmp_path, names):
+    vertices = np.float32(POSITIONS)
+    path = saved(tmp_path, **{names[0]: vertices, names[1]: FACES, "fps": 12.5})
+    moving, notes = read_mesh_sequence([path], bind=2)
+    np.testing.assert_array_equal(moving.positions, vertices)
+    np.testing.assert_array_equal(moving.figure.mesh.positions, vertices[2])
+    # Two triangles for each quad, of the same area.
+    corners = moving.figure.mesh.positions[moving.figure.mesh.triangles]
+    areas = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    np.testing.assert_allclose(areas, np.ones(24), rtol=1e-6)
+    assert (moving.figure.name, moving.frame_rate, moving.bind, notes) == ("walk", 12.5, 2, [])
+
+
+def test_array_of_frames_takes_its_faces_from_a_mesh(tmp_path):
+    (mesh,) = written(tmp_path, POSITIONS[:1], head="# box: z up\n")
+    np.save(tmp_path / "motion.npy", POSITIONS)
+    moving, _ = read_mesh_sequence([mesh, tmp_path / "motion.npy"], rate=5.0)
+    np.testing.assert_array_equal(moving.positions, POSITIONS)
+    assert (moving.figure.up, moving.figure.mesh.n_triangles, moving.frame_rate) == ("z", 24, 5.0)
+    assert not stores_frames([tmp_path / "motion.npy"])  # no faces
+
+
+def test_other_archives_are_no_frames(tmp_path):
+    paths = [
+        saved(tmp_path, "template.npz", v_template=POSITIONS[0], f=FACES),
+        saved(tmp_path, "still.npz", vertices=POSITIONS[0], faces=FACES),
+        saved(tmp_path, "flat.npz", vertices=POSITIONS[:, :, :2], faces=FACES),
+        saved(tmp_path, "cloud.npz", vertices=POSITIONS),
+    ]
+    assert not any(stores_frames([path]) for path in paths)
+
+
+def with_nan():
+    vertices = POSITIONS.copy()
+    vertices[2, 5, 1] = np.nan
+    return vertices
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"vertices": with_nan()}, "walk.npz: vertices: expected finite numbers, found nan at "
+         "vertex 5 of frame 2"),
+        ({"faces": FACES + 1}, "faces: expected a vertex index from 0 to 15, found 16"),
+        ({"faces": FACES[:0]}, "faces: expected faces, found none"),
+        ({"vertices": POSITIONS[:0]}, "expected vertices in frames, found shape 0 x 16 x 3"),
+        ({"vertices": POSITIONS[:1]}, "in two frames or more, found one"),
+        ({"fps": -1.0}, "fps: expected 1e-06 to 1,000,000 frames per second, found -1"),
+    ],
+)  # fmt: skip
+def test_invalid_archives_are_refused(tmp_path, arrays, message):
+    path = saved(tmp_path, **{"vertices": POSITIONS, "faces": FACES} | arrays)
+    with pytest.raises(ViewerError, match=message):
+        read_mesh_sequence([path])
+
+
+def test_mesh_with_other_vertices_is_refused(tmp_path):
+    (mesh,) = written(tmp_path, POSITIONS[:1])
+    path = saved(tmp_path, vertices=POSITIONS[:, :12])
+    with pytest.raises(ViewerError, match=r"vertices: expected 16 vertices as in box_1.obj, .* 12"):
+        read_mesh_sequence([path, mesh])

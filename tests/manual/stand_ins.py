@@ -249,7 +249,11 @@ def _motions(folder: Path) -> None:
     shutil.copy("cat.ply", "spider.ply")
     _made("convert", "spider.ply", "-o", "spider.obj")
     (folder / "frames").mkdir()
-    moving_shapes.write_frames(folder / "frames", "box", *moving_shapes.two_boxes())
+    positions, faces = moving_shapes.two_boxes()
+    first, *_ = moving_shapes.write_frames(folder / "frames", "box", positions, faces)
+    np.savez("frames.npz", vertices=positions, faces=faces)
+    np.save("frames.npy", positions)
+    shutil.copy(first, "cloth.obj")
     _made("rig", "frames", "-o", "face.glb")
     _made("rig", "scan.obj", "--from", "body", "-o", "scan.npz", "--method", "nearest")
 

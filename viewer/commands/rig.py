@@ -54,7 +54,7 @@ from viewer.exporters import (
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
-from viewer.loading.mesh_sequence import SEQUENCES, read_mesh_sequence
+from viewer.loading.mesh_sequence import ARCHIVES, SEQUENCES, read_mesh_sequence, stores_frames
 from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import counted, printable, rounded
@@ -93,7 +93,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="TARGET",
         help=f"the mesh: {', '.join(MESHES)}; and its texture image; or the frames of a mesh that "
-        f"moves, several {' or '.join(SEQUENCES)} files or a folder of them",
+        f"moves: several {' or '.join(SEQUENCES)} files, a folder of them, or an "
+        f"{' or '.join(ARCHIVES)} file of all vertices, with the faces in it or in a mesh file",
     )
     parser.add_argument(
         "--from",
@@ -188,7 +189,7 @@ def run(arguments: argparse.Namespace) -> int:
     from viewer.exporters._rigged_files import files_of, write_rigged
 
     frames_of_mesh = _sequence(arguments.files)
-    if arguments.bones is not None or len(frames_of_mesh) > 1:
+    if arguments.bones is not None or frames_of_mesh:
         return _rig_moving(arguments, frames_of_mesh)
     output = None if arguments.output is None else Path(arguments.output)
     meta = settings_of(VrmMeta, arguments)
@@ -353,11 +354,13 @@ def _transferred(
 
 
 def _sequence(files: Sequence[str]) -> list[Path]:
-    """Return the frames of a mesh if all arguments are such files, or one folder of them."""
+    """Return the frames of a mesh if the arguments are such files, or one folder of them."""
     paths = [Path(file) for file in files]
     if len(paths) == 1 and paths[0].is_dir():
         paths = [path for path in paths[0].iterdir() if path.suffix.lower() in SEQUENCES]
-    return paths if all(path.suffix.lower() in SEQUENCES for path in paths) else []
+    if len(paths) > 1 and all(path.suffix.lower() in SEQUENCES for path in paths):
+        return paths
+    return paths if stores_frames(paths) else []
 
 
 def _rig_moving(arguments: argparse.Namespace, sequence: list[Path]) -> int:
@@ -381,7 +384,7 @@ def _rig_moving(arguments: argparse.Namespace, sequence: list[Path]) -> int:
     how = how if most is None else replace(how, max_influences=most)
     frames = frames_of(arguments)
     with shown_progress("finding bones"):
-        if len(sequence) > 1:
+        if sequence:
             moving, notes = read_mesh_sequence(sequence, frames.fps, arguments.bind_frame)
             print_warnings(notes)
         else:

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from viewer.diagnostics import wording
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
-from viewer.phrases import Remedy, printable
+from viewer.phrases import Remedy, listed, printable
 from viewer.rigs.bodies.smpl_family import gender_of, model_title
+from viewer.rigs.motion.timing import FASTEST, SLOWEST, is_rate
 
 GENDERS = ("gender", "genders")
 MODELS = ("surface_model_type", "model_type", "body_model", "smpl_type", "model")
@@ -49,6 +50,26 @@ def single(archive: Archive, key: str) -> float:
     if len(values) != 1:
         raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))
     return float(finite(archive, key, values)[0])
+
+
+def rate_in(archive: Archive) -> float | None:
+    """Return the frame rate that an archive states first, None if it states none."""
+    rates = {key: single(archive, key) for key in RATES if archive.has(key)}
+    for key, rate in rates.items():
+        if not is_rate(rate):
+            raise archive.fault(
+                "F002.motion-rate: {item}: expected {low:g} to {high:,.0f} frames per second, "
+                "found {found:g}",
+                item=key,
+                low=SLOWEST,
+                high=FASTEST,
+                found=rate,
+            )
+    if len(set(rates.values())) > 1:
+        archive.source.warn(
+            wording.MOTION_RATES, rates=listed([f"{key} {rate:g}" for key, rate in rates.items()])
+        )
+    return next(iter(rates.values()), None)
 
 
 def scale_in(archive: Archive, key: str) -> float:

@@ -31,8 +31,8 @@ from viewer.formats._body_keys import (
     RATES,
     gender_in,
     model_in,
+    rate_in,
     scale_in,
-    single,
 )
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
@@ -42,7 +42,7 @@ from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 from viewer.rigs.geometry.vectors import SIGNED_UPS, StatedUp
 from viewer.rigs.motion.body_motion import BodyMotion
-from viewer.rigs.motion.timing import FASTEST, SLOWEST, Timing, is_rate
+from viewer.rigs.motion.timing import Timing
 
 _POSES = ("poses", "pose", "fullpose", "smpl_poses")
 _ROOTS = ("root_orient", "global_orient")
@@ -322,23 +322,9 @@ def _coefficients(
 
 
 def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
-    rates = {key: single(archive, key) for key in RATES if archive.has(key)}
-    for key, rate in rates.items():
-        if not is_rate(rate):
-            raise archive.fault(
-                "F002.motion-rate: {item}: expected {low:g} to {high:,.0f} frames per second, "
-                "found {found:g}",
-                item=key,
-                low=SLOWEST,
-                high=FASTEST,
-                found=rate,
-            )
-    if len(set(rates.values())) > 1:
-        source.warn(
-            wording.MOTION_RATES, rates=listed([f"{key} {rate:g}" for key, rate in rates.items()])
-        )
-    if rates:
-        return next(iter(rates.values()))
+    stated = rate_in(archive)
+    if stated is not None:
+        return stated
     if is_aist:
         source.warn(
             "F007.motion-aist-rate: no frame rate: {rate:g} fps assumed, as in AIST++",

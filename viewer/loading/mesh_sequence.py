@@ -1,15 +1,23 @@
-"""Files of one mesh, a file per frame, as a moving mesh.
+"""The frames of a mesh as a moving mesh: a file per frame, or an archive of all vertices.
 
 Files are frames in the order of the numbers in their names: ``walk_2.obj`` before ``walk_10.obj``.
 If the names differ only by a number, it is the number of the frame, and missing numbers are gaps.
 All files must have the vertices and faces of the first one; only positions may differ. Quads may be
 divided along the other diagonal, because readers choose it by the shape of the quad.
+
+An archive has vertices (F, V, 3), with faces (T, 3) or quads (Q, 4) in it or in a mesh file that is
+given with it. It is read one frame at a time::
+
+    npz = vertices | verts | positions | points (F, V, 3)   faces | triangles | f (T, 3 or 4)
+          fps | frame_rate | …
+    npy = (F, V, 3)
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +25,25 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, frame_range, note
 from viewer.errors import FormatError
 from viewer.formats import Source, natural_key, read
-from viewer.phrases import counted, listed, printable
+from viewer.formats._archive.checking import archive_of, corners_of
+from viewer.formats._archive.values import Archive
+from viewer.formats._body_keys import rate_in
+from viewer.formats._polygons import triangulate
+from viewer.phrases import axes, counted, listed, printable
 from viewer.progress import report
-from viewer.rigs.arrays import Ints
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.mesh import Mesh
+from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.motion.moving_mesh import MovingMesh, bind_row, room_for
 from viewer.rigs.motion.timing import DEFAULT_RATE
 
 SEQUENCES = (".obj", ".ply")
 """Suffixes of files that may be the frames of a mesh."""
+ARCHIVES = (".npz", ".npy")
+"""Suffixes of files that may have all frames of a mesh."""
+_VERTICES = ("vertices", "verts", "positions", "points", "arr_0")
+_FACES = ("faces", "triangles", "f")
+_LARGEST = 1 << 40  # bytes of an archive, of which one frame is in memory
 _NUMBER = re.compile(r"(\d+)(?=\D*$)")
 
 
@@ -35,9 +52,12 @@ def read_mesh_sequence(
 ) -> tuple[MovingMesh, list[Diagnostic]]:
     """Read the frames of a mesh, in natural order, and return notes about them.
 
-    ``bind``: number of the bind frame, by default the first one. ``FormatError`` at the first
-    vertex or face that differs from those of the first file.
+    ``paths``: a file per frame, or those of ``stores_frames``. ``bind``: number of the bind frame,
+    by default the first one. ``FormatError`` at the first vertex or face that differs from those of
+    the first file.
     """
+    if stores_frames(paths):
+        return _read_archive(paths, rate, bind)
     ordered = sorted(paths, key=lambda path: natural_key(path.as_posix()))
     numbers, notes = frame_numbers(ordered)
     row = bind_row(numbers, bind)
@@ -58,6 +78,105 @@ def read_mesh_sequence(
     name = _NUMBER.sub("", ordered[0].stem).strip("_-. ") or ordered[0].parent.name or "mesh"
     whole = Figure(name, bound.mesh, up=bound.up, unit=bound.unit)
     return MovingMesh(whole, positions, numbers, rate or DEFAULT_RATE, row), notes
+
+
+def stores_frames(paths: Sequence[Path]) -> bool:
+    """Return whether files are an archive of a moving mesh, with or without a file of its faces."""
+    archives, others = _divided(paths)
+    if len(archives) != 1 or len(others) > 1 or any(not _is_frame(path) for path in others):
+        return False
+    archive = archive_of(Source.open(archives[0], max_size=_LARGEST))
+    return _key_of_vertices(archive) is not None and (
+        len(others) == 1 or any(archive.has(key) for key in _FACES)
+    )
+
+
+def _divided(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """Return the archives among some files, and the others."""
+    archives = [path for path in paths if path.suffix.lower() in ARCHIVES]
+    return archives, [path for path in paths if path not in archives]
+
+
+def _is_frame(path: Path) -> bool:
+    return path.suffix.lower() in SEQUENCES
+
+
+def _key_of_vertices(archive: Archive) -> str | None:
+    shapes = {key: archive.shape(key) for key in _VERTICES if archive.has(key)}
+    return next((key for key, shape in shapes.items() if len(shape) == 3 and shape[2] == 3), None)
+
+
+def _read_archive(
+    paths: Sequence[Path], rate: float | None, bind: int | None
+) -> tuple[MovingMesh, list[Diagnostic]]:
+    """Read a moving mesh from an archive, one frame at a time."""
+    (path,), others = _divided(paths)
+    source = Source.open(path, max_size=_LARGEST)
+    archive = archive_of(source)
+    key = _key_of_vertices(archive)
+    assert key is not None  # checked by stores_frames
+    stored = archive.array(key)
+    count, n_vertices, _ = stored.shape
+    if not count or not n_vertices:
+        raise archive.fault(
+            "F002.sequence-empty: {item}: expected vertices in frames, found shape {shape}",
+            item=key,
+            shape=axes(stored.shape),
+        )
+    row = bind_row(np.arange(count, dtype=np.int32), bind)
+    positions = room_for(count, n_vertices)
+    for frame, block in enumerate(stored.blocks(1)):
+        report(frame, count, "frames", "reading")
+        if not np.isfinite(block).all():
+            raise archive.fault(
+                "F003.sequence-number: {item}: expected finite numbers, found {found} at vertex "
+                "{vertex} of frame {frame}",
+                item=key,
+                found=float(block[~np.isfinite(block)][0]),
+                vertex=int(np.argwhere(~np.isfinite(block[0]))[0][0]),
+                frame=frame,
+            )
+        positions[frame] = block[0]
+    if others:
+        whole = _mesh_of(Source.open(others[0]))
+        mesh = whole.require_mesh()
+        if mesh.n_vertices != n_vertices:
+            raise archive.fault(
+                "F004.sequence-mesh-vertices: {item}: expected {wanted} as in {first}, found "
+                "{found}",
+                item=key,
+                wanted=counted(mesh.n_vertices, "vertex"),
+                first=printable(others[0].name, 60),
+                found=n_vertices,
+            )
+        bound = replace(
+            mesh,
+            positions=positions[row],
+            normals=vertex_normals(positions[row], mesh.triangles),
+        )
+        figure = replace(whole, mesh=bound)
+    else:
+        triangles = _faces_in(archive, positions[row])
+        bound = Mesh(positions[row], vertex_normals(positions[row], triangles), triangles)
+        figure = Figure(path.stem, bound)
+    numbers = np.arange(count, dtype=np.int32)
+    rate = rate or rate_in(archive) or DEFAULT_RATE
+    return MovingMesh(figure, positions, numbers, rate, row), list(source.diagnostics)
+
+
+def _faces_in(archive: Archive, positions: Floats) -> Ints:
+    """Return the triangles (T, 3) of an archive with triangles or quads."""
+    key = next(key for key in _FACES if archive.has(key))
+    shape = archive.shape(key)
+    corners = 4 if len(shape) == 2 and shape[1] == 4 else 3
+    listed = archive.array(key, (None, corners)).values()
+    if not len(listed):
+        raise archive.fault("F002.sequence-no-faces: {item}: expected faces, found none", item=key)
+    faces = corners_of(archive, key, listed, len(positions))
+    sizes = np.full(len(faces), corners, dtype=np.int32)
+    picks = triangulate(positions, faces.ravel(), sizes)[0]
+    triangles: Ints = faces.ravel()[picks].astype(np.int32)
+    return triangles
 
 
 def frame_numbers(paths: Sequence[Path]) -> tuple[Ints, list[Diagnostic]]:

@@ -168,6 +168,14 @@ def test_blocks_of_rows_are_those_of_the_whole_array(packed, count):
                 assert not array.is_loaded
 
 
+def test_single_arrays_are_read_by_blocks(tmp_path):
+    values = np.arange(66.0).reshape(11, 3, 2)
+    np.save(tmp_path / "v.npy", values)
+    array = open_archive(Source.open(tmp_path / "v.npy")).array("arr_0")
+    assert_array_equal(np.concatenate([block.copy() for block in array.blocks(4)]), values)
+    assert not array.is_loaded
+
+
 def test_damage_is_detected_while_reading_blocks():
     values = np.arange(60_000.0).reshape(-1, 3)
     data = bytearray(npz(v=values))

@@ -18,8 +18,9 @@ import re
 import struct
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
-from typing import IO
+from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ _ITEM = re.compile(
     rb"(?:'(?P<descr>[^'\\]{1,20})'|(?P<order>True|False)|\((?P<shape>[0-9L,\s]*)\))"
 )
 _OBJECTS = Opaque(Phrase("object array"))
+_Opened: TypeAlias = Callable[[], AbstractContextManager[IO[bytes]]]
+"""Opens an array in its file."""
 _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 
 
@@ -107,7 +110,8 @@ def open_npy(
     else:
         if storage.size > source.max_size:
             raise too_large(source.path, storage.size, source.max_size)
-        value = header.deferred(partial(_load_file, storage, key, header))
+        how = storage, key, header, partial(_opened_file, storage, key)
+        value = header.deferred(partial(_load, *how), partial(_blocks, *how))
     return Archive(source, "npy", (key,), {key: value}.__getitem__)
 
 
@@ -124,8 +128,8 @@ def _open_member(directory: ZipDirectory, member: zipfile.ZipInfo) -> Value:
         header = _read_header(storage, key, stream, member.file_size)
     if isinstance(header, Opaque):
         return header
-    how = storage, member, header
-    return header.deferred(partial(_load_member, *how), partial(_member_blocks, *how))
+    how = storage, key, header, partial(opened_member, storage, member, key)
+    return header.deferred(partial(_load, *how), partial(_blocks, *how))
 
 
 def _read_header(storage: StoredFile, key: str, stream: IO[bytes], size: int) -> _Header | Opaque:
@@ -193,34 +197,28 @@ def _parse_shape(text: bytes | None) -> tuple[int, ...] | None:
     return tuple(map(int, words))
 
 
-def _load_member(
-    storage: StoredFile, member: zipfile.ZipInfo, header: _Header
-) -> NDArray[np.generic]:
-    with opened_member(storage, member, _key(member)) as stream:
-        return _load(storage, _key(member), header, stream)
+@contextmanager
+def _opened_file(storage: StoredFile, key: str) -> Iterator[IO[bytes]]:
+    try:
+        with storage.open() as stream:
+            yield stream
+    except DAMAGE as problem:
+        raise storage.damaged(key, problem) from None
 
 
-def _member_blocks(
-    storage: StoredFile, member: zipfile.ZipInfo, header: _Header, count: int
+def _blocks(
+    storage: StoredFile, key: str, header: _Header, opened: _Opened, count: int
 ) -> Iterator[NDArray[np.generic]]:
     """Yield blocks of rows, all in the same memory."""
     row = math.prod(header.shape[1:])
-    with opened_member(storage, member, _key(member)) as stream:
+    with opened() as stream:
         stream.read(header.offset)
         flat = np.empty(min(count, header.shape[0]) * row, header.dtype)
         for start in range(0, header.shape[0], count):
             n_rows = min(count, header.shape[0] - start)
             part = flat[: n_rows * row]
-            _fill(storage, _key(member), part, stream)
+            _fill(storage, key, part, stream)
             yield part.reshape(n_rows, *header.shape[1:])
-
-
-def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[np.generic]:
-    try:
-        with storage.open() as stream:
-            return _load(storage, key, header, stream)
-    except DAMAGE as problem:
-        raise storage.damaged(key, problem) from None
 
 
 def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
@@ -230,14 +228,15 @@ def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
         return b"".join(iter(partial(stream.read, _CHUNK), b""))
 
 
-def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[np.generic]:
-    stream.read(header.offset)
+def _load(storage: StoredFile, key: str, header: _Header, opened: _Opened) -> NDArray[np.generic]:
     size = header.n_items * header.dtype.itemsize
-    try:
-        flat = np.empty(header.n_items, header.dtype)
-    except MemoryError:
-        raise storage.fault(key, "not enough memory: {size} bytes needed", size=size) from None
-    _fill(storage, key, flat, stream)
+    with opened() as stream:
+        stream.read(header.offset)
+        try:
+            flat = np.empty(header.n_items, header.dtype)
+        except MemoryError:
+            raise storage.fault(key, "not enough memory: {size} bytes needed", size=size) from None
+        _fill(storage, key, flat, stream)
     try:
         return shaped(flat, header.shape, header.is_fortran)
     except InvalidValueError as problem:
