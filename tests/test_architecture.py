@@ -45,9 +45,10 @@ PARTS = {
     "rendering": {"rigs", "interrupts", "resources"},
     "exporters": {"autorig", "formats", "media", "rendering", "rigs", "interrupts"},
     "loading": {"formats", "models", "rigs", "interrupts"},
+    "live": {"rigs"},
     "app": {
-        *("autorig", "exporters", "formats", "linting", "loading", "manual", "media", "models"),
-        *("rendering", "rigs", "interrupts", "resources"),
+        *("autorig", "exporters", "formats", "linting", "live", "loading", "manual", "media"),
+        *("models", "rendering", "rigs", "interrupts", "resources"),
     },
     "linting": {"loading", "formats", "rigs"},
     "batching": {"formats", "media", "interrupts", "streams", "version"},
@@ -94,6 +95,7 @@ ALLOWED_IN_APP = {
     "posing": {"core", "files", "curves", "posing"},
     "weights": {"core", "layout", "files", "posing", "weights"},
     "view": {"core", "files", "posing", "weights", "view"},
+    "live": {"core", "actors", "closing", "live"},
     "manual": {"core", "manual"},
     "palette": {"core", "palette"},
     "context_menu": {

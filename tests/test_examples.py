@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from live_screen import screen_at
+from manual.test_commands import shown_without_display
 from PIL import Image
 
 import viewer
@@ -201,6 +203,18 @@ def test_batch_runs_the_function_in_workers(tmp_path):
     assert row["name"] == "body.npz" and row["status"] == "done"
     assert int(row["vertices"]) == len(body)
     assert float(row["height"]) == pytest.approx(body[:, 1].max(), abs=1e-3)
+
+
+def test_live_training_moves_the_jaw_to_its_target(script, tmp_path, monkeypatch):
+    path = tmp_path / "window.json"
+    monkeypatch.setenv("VIEWER_CONNECTION_FILE", str(path))
+    monkeypatch.setattr("viewer.show", shown_without_display)
+    with screen_at(path) as screen:
+        names = script("live_training")
+        posed, wanted = screen.state.scene.actors[0].joints()[0], names["target"]
+    # It begins 0.07 away, and the window shows the last step.
+    assert float(re.findall(r"([\d.]+) from the target", script.text)[0]) < 0.02
+    assert np.linalg.norm(posed[names["jaw"]] - wanted) < 0.02
 
 
 def test_own_scalar_is_brightest_at_the_tip_of_the_tail(script):

@@ -16,12 +16,13 @@ from dragged_files import drag_and_vanish, drag_files
 from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
 from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
-from PIL import Image
+from PIL import Image, ImageGrab
 from x11_clipboard import offer_clipboard, read_clipboard
 
 import viewer
 from viewer.app.view.picks import vertex_at
 from viewer.app.window import Rest
+from viewer.errors import ViewerError
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.inspection.front import guess_front
@@ -415,6 +416,38 @@ def test_old_opengl_opens_no_window(display, tmp_path, name, value, words):
     assert done.returncode == 4 and done.stdout == b"" and done.stderr.count(b"\n") == 1
     for word in (*words, b"renderer ", f"{name}={value}".encode()):
         assert word in done.stderr
+
+
+def test_window_of_a_program_follows_it_and_closes_with_it(display, tmp_path, monkeypatch):
+    for name in ("STATE", "CONFIG"):
+        monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name))
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    scene = viewer.load()
+    settings = DisplayOptions(quality="draft", shading="normals")
+    with viewer.show(scene, options=settings, block=False) as window:
+        before = _wait_for(lambda: _screen_if_drawn(display), "the figure")
+        scene[0].pose.figure_translation[:] = [0.0, 0.1, 0.0]
+        window.update()
+        _wait_for(lambda: (_screen_if_drawn(display) != before).any(), "another pose")
+        assert window["fox"] is scene[0]
+        other = viewer.connect(window._folder / "window.json")
+        assert np.array_equal(other["fox"].pose.figure_translation, [0.0, 0.1, 0.0])
+        other.close()
+        process, folder = window._process, window._folder
+    assert (process.returncode, folder.exists(), window.is_open) == (0, False, False)
+
+
+def _screen_if_drawn(display):
+    pixels = np.array(ImageGrab.grab(xdisplay=display).convert("RGB"))
+    return pixels if pixels.max() > 0 else None
+
+
+def test_window_of_a_program_without_a_display_is_an_error(monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":987")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ViewerError, match="no display found"):
+        viewer.show(viewer.load(), block=False)
 
 
 def test_awaited_event_is_followed_by_frames_showing_it():

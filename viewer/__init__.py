@@ -9,7 +9,7 @@
 >>> viewer.render(scene, size=(320, 240)).shape            # (H, W, 4) uint8
 (240, 320, 4)
 
-Open and show      load, show, render, video, widget (in notebooks)
+Open and show      load, show, render, video, widget (in notebooks), connect (other processes)
 Arrays             Actor.vertices, .joints, .at, motion, deform, deform_frames, joint_matrices
 Your own arrays    figure, animate
 Files              export, write
@@ -32,19 +32,20 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from viewer.app.window import show
     from viewer.batching.report import Report
     from viewer.commands._batch.calling import batch
     from viewer.commands._cleanup import clean
     from viewer.commands._exports import export
     from viewer.commands._pictures import render, video
     from viewer.commands._retarget import retarget
+    from viewer.commands._show import show
     from viewer.commands._widget import widget
     from viewer.commands.diff import Comparison, diff
     from viewer.commands.lint import Findings, lint
     from viewer.commands.rig import rig
     from viewer.errors import ViewerError
     from viewer.formats import write
+    from viewer.live.program import connect
     from viewer.loading import load
     from viewer.loading.own_arrays import animate, figure
     from viewer.rendering.camera import Camera
@@ -97,6 +98,7 @@ __all__ = [
     "apply_record",
     "batch",
     "clean",
+    "connect",
     "deform",
     "deform_frames",
     "diff",
@@ -153,6 +155,7 @@ _HOMES = {
     "apply_record": "rigs.posing.pose_record",
     "batch": "commands._batch.calling",
     "clean": "commands._cleanup",
+    "connect": "live.program",
     "deform": "rigs.skinning",
     "deform_frames": "rigs.skinning",
     "diff": "commands.diff",
@@ -173,7 +176,7 @@ _HOMES = {
     "rig": "commands.rig",
     "sample": "rigs.motion.clip",
     "shaped": "rigs.shape",
-    "show": "app.window",
+    "show": "commands._show",
     "video": "commands._pictures",
     "widget": "commands._widget",
     "with_rest_mesh": "rigs.shape",

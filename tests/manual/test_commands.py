@@ -4,9 +4,11 @@ import os
 import re
 import shutil
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from live_screen import screen_at
 from manual.stand_ins import HOME, make_all
 from manual.test_pages import PATHS, blocks
 
@@ -21,6 +23,7 @@ NOT_RUN = {
     "pip install": "installs packages",
     "#": "options of a batch system, in a script for it",
     "viewer models add anny": "downloads 48 MB",
+    "viewer serve": "opens a window, which tests/test_live_window.py does",
     "viewer doctor --bench": "measures this machine for a minute",
     "viewer batch render models/ -o out/ --cluster tcp": "needs a running scheduler",
     "viewer batch convert 'amass/**/*.npz' --to bvh -o out/ --cluster local": "starts processes; "
@@ -128,10 +131,22 @@ def test_python_examples_run_as_printed(path, files, tmp_path, monkeypatch):
     for name, source in OWN.get(path.name, {}).items():
         if source is None:
             (folder / name).unlink()
-    monkeypatch.setattr("viewer.show", lambda scene: None)  # no display is needed
+    monkeypatch.setattr("viewer.show", shown_without_display)
+    monkeypatch.setenv("VIEWER_CONNECTION_FILE", str(tmp_path / "window.json"))
+    is_live = any("viewer.connect" in example for example in examples)
     names: dict[str, object] = {}
-    for example in examples:
-        exec(compile(example, path.name, "exec"), names)
+    with screen_at(tmp_path / "window.json") if is_live else nullcontext():
+        for example in examples:
+            exec(compile(example, path.name, "exec"), names)
+
+
+def shown_without_display(scene, block=True):
+    """Return a connection to the screen in place of a window."""
+    if block:
+        return None
+    live = viewer.connect()
+    live.show(scene)
+    return live
 
 
 def words_of(line: str) -> list[str]:

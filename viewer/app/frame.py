@@ -24,6 +24,7 @@ from viewer.app.files.saving import save_screenshot
 from viewer.app.interface import draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
+from viewer.app.live import advance_live
 from viewer.app.manual import Manual
 from viewer.app.mouse import drop_motion_before_press, handle_mouse, is_held, stops_time
 from viewer.app.overlays import draw_hints
@@ -107,6 +108,7 @@ class Frame:
         take_streamed(state)
         if state.clock.pose(state.actor):
             state.history.follow(state.update_version(), state.clock.time)
+        advance_live(state)
         follow_actor(state)
         keep_fitting(state, state.of(Files).stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)

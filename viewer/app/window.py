@@ -32,6 +32,7 @@ from viewer.app.files.recent import (  # noqa: E402
 )
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
+from viewer.app.live import Live, advance_live  # noqa: E402
 from viewer.app.native_window import Shell, create_context, create_window  # noqa: E402
 from viewer.app.posing.posing import Posing  # noqa: E402
 from viewer.app.preferences.applying import start_with  # noqa: E402
@@ -70,6 +71,7 @@ def show(
     motion: MotionSettings | None = None,
     shell: Shell | None = None,
     messages: Sequence[str] = (),
+    live: Live | None = None,
 ) -> None:
     """Open a window and return when it is closed.
 
@@ -97,6 +99,8 @@ def show(
         Window that is already open; a new one if omitted. It is closed at the end.
     messages : sequence of str
         Messages to show in the window.
+    live : Live, optional
+        What other programs may change in the window.
 
     Raises
     ------
@@ -124,6 +128,8 @@ def show(
     opened = state.of(Files)
     opened.recent, opened.keeps_recent = load_recent(problems.append), True
     opened.wake = glfw.post_empty_event
+    if live is not None:
+        state.put(live).wake_by(glfw.post_empty_event)
     state.of(ShownPanels).closed = load_closed_panels(problems.append)
     start_with(state, preferences)
     is_arranged = load_arranged(problems.append)
@@ -137,6 +143,7 @@ def show(
         stream_captures(state, builders)
         window.run()
     finally:
+        state.of(Live).wake_by(lambda: None)  # GLFW ends before threads of other programs do
         window.release()
 
 
@@ -205,6 +212,7 @@ class _Window:
             # Redraw for messages that time out, progress bars and blinking text cursors.
             shell.is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
         shell.is_dirty |= state.clock.playing or state.job is not None or steps or improves
+        shell.is_dirty |= state.of(Live).has_news
         # ImGui spreads quick events over several frames, so those left in its queue also count.
         return shell.is_dirty or bool(shell.dropped) or len(shell.imgui.input_events_queue) > 0
 
@@ -223,6 +231,7 @@ class _Window:
         """Draw one frame unless the window currently has no pixels."""
         size = glfw.get_framebuffer_size(self.handle)
         if min(size) < 1:
+            advance_live(self.state)  # programs do not wait until the window is restored
             return
         shell = self.shell
         shell.set_title(_title(self.state))

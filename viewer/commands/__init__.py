@@ -4,6 +4,7 @@ from __future__ import annotations
 
 COMMANDS = {
     "view": "open files in a window (the default)",
+    "serve": "open files in a window that other programs on this machine move",
     "render": "render files to an image or video, without a window",
     "convert": "write figures, poses and motions in other formats",
     "batch": "run convert, render, rig, info, diff or lint for many files, in parallel",

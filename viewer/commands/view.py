@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Collection, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -51,6 +50,7 @@ from viewer.rigs.scene import Scene, scene_points
 from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
+    from viewer.app.live import Live
     from viewer.loading.capturing import Builder
 
 
@@ -84,23 +84,14 @@ def _scale(text: str) -> float:
 def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the image that it would show."""
     from viewer.app.display import NoDisplay, find_display
-    from viewer.app.preferences.preferences import load_preferences
 
-    problems: list[str] = []  # about damaged preferences
-    preferences = load_preferences(problems.append)
-    if arguments.samples is None:
-        arguments.samples = preferences.samples
-    arguments.quality = arguments.quality or preferences.quality
-    arguments.up = arguments.up or preferences.up or None
-    options, asked = display_of(arguments), scene_options(arguments)
-    view = settings_of(ViewOptions, arguments)
-    begin = partial(_start, asked, view, options, stated(Skinning, arguments))
+    asked = _asked(arguments)
     try:
         find_display()
     except NoDisplay as problem:
-        for text in problems:
+        for text in asked.problems:
             to_stderr(text)
-        start = begin()
+        start = asked.begin()
         for builder in start.builders:
             finish(builder, start.scene)
         box = bounding_box(start.points)
@@ -108,14 +99,51 @@ def run(arguments: argparse.Namespace) -> int:
         from viewer.commands.render import draw_scene
         from viewer.formats import save_image
 
-        print_warnings(choose_subject(start.scene, options))
+        print_warnings(choose_subject(start.scene, asked.options))
         path = free_path(Path.cwd(), start.scene.title, ".png")
-        save_image(path, draw_scene(start.scene, SIZE, start.camera, options, box))
+        save_image(path, draw_scene(start.scene, SIZE, start.camera, asked.options, box))
         print(f"{problem}; drew {printable(path, 300)} instead")
         return 0
+    return open_window(arguments, asked)
+
+
+class _Asked(NamedTuple):
+    """What options ask for, with defaults from the user's preferences."""
+
+    scene: SceneOptions
+    view: ViewOptions
+    options: DisplayOptions
+    given: Collection[str]
+    problems: list[str]
+    """Messages about damaged preferences."""
+
+    def begin(self) -> _Start:
+        """Open and pose the files."""
+        return _start(self.scene, self.view, self.options, self.given)
+
+
+def _asked(arguments: argparse.Namespace) -> _Asked:
+    from viewer.app.preferences.preferences import load_preferences
+
+    problems: list[str] = []
+    preferences = load_preferences(problems.append)
+    if arguments.samples is None:
+        arguments.samples = preferences.samples
+    arguments.quality = arguments.quality or preferences.quality
+    arguments.up = arguments.up or preferences.up or None
+    options, scene = display_of(arguments), scene_options(arguments)
+    view = settings_of(ViewOptions, arguments)
+    return _Asked(scene, view, options, stated(Skinning, arguments), problems)
+
+
+def open_window(
+    arguments: argparse.Namespace, asked: _Asked | None = None, live: Live | None = None
+) -> int:
+    """Open files in a window, which ``live`` lets other programs change; return when it closes."""
     from viewer.app.opening import Opening, watch
 
-    opening = Opening(_title(asked.files), begin)
+    asked = asked or _asked(arguments)
+    opening = Opening(_title(asked.scene.files), asked.begin)
     try:
         shell = watch(opening, arguments.scale)
     except Cancelled:
@@ -131,15 +159,16 @@ def run(arguments: argparse.Namespace) -> int:
     show(
         start.scene,
         camera=start.camera,
-        options=options,
-        paths=asked.paths,
+        options=asked.options,
+        paths=asked.scene.paths,
         scale=arguments.scale,
-        fit_distance=view.fits,
+        fit_distance=asked.view.fits,
         builders=start.builders,
         plays=arguments.play,
-        motion=asked.motion,
+        motion=asked.scene.motion,
         shell=shell,
-        messages=problems,
+        messages=asked.problems,
+        live=live,
     )
     return 0
 

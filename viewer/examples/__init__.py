@@ -10,6 +10,7 @@ EXAMPLES = {
     "compare_rigs": "how far two rigs of one character differ, in many poses",
     "paper_figure": "a figure for a paper: white, orthographic, from the side",
     "batch": "a function for many files, in worker processes, with a table of results",
+    "live_training": "a window that moves while a program computes",
     "own_scalar": "your own numbers per vertex as colours, with a legend",
 }
 """Scripts in this folder, and what they show."""

@@ -25,6 +25,7 @@ PAGES = {
     "batches": "many files: batches, reports, grading, clusters",
     "window": "panels, tools and the mouse",
     "python": "the Python API",
+    "live": "windows that other programs move: training loops, motion capture",
     "plugins": "packages that add formats, quantities and commands",
     "formats": "what is read and written, and what each format keeps",
     "gallery": "pictures of bundled data, and the commands that drew them",

@@ -52,7 +52,7 @@ def shows_errors(
 
 @dataclass(slots=True)
 class Stats:
-    """Duration and renderer of the last frame."""
+    """Facts of the last frame."""
 
     frame_ms: float = 0.0
     renderer: str = ""
@@ -61,6 +61,8 @@ class Stats:
     scalar_range: tuple[float, float] = (0.0, 0.0)
     scalar_ends: tuple[float, float] = (0.0, 0.0)
     legend: Legend | None = None
+    live: list[tuple[str, str]] = field(default_factory=list)
+    """What other programs have sent: headings and texts."""
 
 
 @dataclass(slots=True)

@@ -25,6 +25,7 @@ def draw(state: AppState) -> None:
         ("Renderer", state.stats.renderer),
         ("OpenGL", state.stats.version),
         ("Samples", f"{state.stats.samples or 1} per pixel"),
+        *state.stats.live,
     ):
         imgui.text_disabled(name)
         imgui.same_line(imgui.get_font_size() * 6)

@@ -1,0 +1,301 @@
+"""Programs that move a window over real loopback connections; expected numbers are by hand."""
+
+import json
+import math
+import random
+import re
+import socket
+import stat
+import time
+
+import numpy as np
+import pytest
+from live.test_messages import framed
+from live_screen import screen_at
+
+import viewer
+from viewer.errors import ViewerError
+from viewer.live.messages import Message, packed, read, receiver
+from viewer.live.server import Server
+
+QUARTER = math.pi / 2
+
+
+def bar(name="bar"):
+    """Return two joints along x; the vertices at x = 2 follow the second one, at x = 1."""
+    corners = [[0, 0, 0], [2, 0, 0], [2, 0, 1]]
+    weights = [[1, 0], [0, 1], [0, 1]]
+    return viewer.figure(
+        corners, [[0, 1, 2]], weights=weights, joints=[[0, 0, 0], [1, 0, 0]], name=name
+    )
+
+
+@pytest.fixture
+def screen(tmp_path):
+    with screen_at(tmp_path / "window.json", viewer.Scene([viewer.Actor(bar("first"))])) as screen:
+        yield screen
+
+
+@pytest.fixture
+def live(screen):
+    with viewer.connect(screen.path) as live:
+        yield live
+
+
+def tip(screen, index=-1):
+    """Return where the second vertex of an actor is in the window."""
+    actor = screen.state.scene.actors[index]
+    return viewer.deform(actor.figure, actor.pose)[0][1]
+
+
+def is_at(screen, place, index=-1):
+    return lambda: np.allclose(tip(screen, index), place, atol=1e-12)
+
+
+def raw(screen, *messages):
+    """Send bytes as another program would; return the answers until the server hangs up."""
+    found = []
+    with socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream:
+        receive = receiver(stream)
+        for data in messages:
+            stream.sendall(data)
+            try:
+                found.append(read(receive))
+            except (EOFError, OSError):
+                break
+    return found
+
+
+def hello(screen, **changes):
+    token = json.loads(screen.path.read_text())["token"]
+    return packed(Message("hello", {"version": 1, "token": token, **changes}))
+
+
+def test_added_figure_is_bent_about_its_joint(screen, live):
+    actor = live.add(bar())
+    actor["joint_1"] = [0.0, 0.0, QUARTER]
+    # One unit beyond the joint at x = 1, rotated by 90 degrees about z.
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+
+
+def test_numbers_changed_in_place_are_noticed(screen, live):
+    actor = live.add(bar())
+    rows = np.flatnonzero(actor.figure.skeleton.dof_joints == 1)
+    actor.pose.dofs[rows[1]] = QUARTER  # about y: x goes to -z
+    screen.wait(is_at(screen, [1.0, 0.0, -1.0]))
+
+
+def test_actor_of_the_window_is_fetched_and_moved(screen, live):
+    live["first"].pose.figure_translation[:] = [0.0, 3.0, 0.0]
+    live.update()
+    screen.wait(is_at(screen, [2.0, 3.0, 0.0]))
+    assert len(screen.state.scene.actors) == 1
+
+
+def test_unknown_name_lists_what_there_is(live):
+    with pytest.raises(ViewerError, match="second"):
+        live["second"]
+
+
+def test_placement_and_visibility_follow(screen, live):
+    actor = live.add(bar())
+    actor.placement = np.diag([2.0, 2.0, 2.0, 1.0])
+    actor.visible, actor.color = False, (1.0, 0.5, 0.0)
+    live.update()
+    shown = screen.state.scene.actors[-1]
+    assert (shown.visible, shown.color) == (False, (1.0, 0.5, 0.0))
+    assert np.array_equal(shown.placement, np.diag([2.0, 2.0, 2.0, 1.0]))
+
+
+def test_time_poses_actors_by_their_motion(screen, live):
+    vectors = np.zeros((3, 2, 3))
+    vectors[2, 1] = [0.0, 0.0, QUARTER]
+    live.add(viewer.animate(bar(), vectors, fps=10.0))
+    live.time = 0.2
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+    assert live.time == pytest.approx(0.2)
+    live.scene.time = 0.0
+    screen.wait(is_at(screen, [2.0, 0.0, 0.0]))
+
+
+def test_camera_and_selection_are_read_and_set(screen, live):
+    live.camera = {"azimuth": 40.0, "target": [0.0, 1.0, 0.0]}
+    camera = live.camera
+    assert (camera["azimuth"], camera["target"]) == (40.0, [0.0, 1.0, 0.0])
+    with pytest.raises(ViewerError, match="camera"):
+        live.camera = {"zoom": 1.0}
+    assert live.selection == ("first",)
+    screen.state.selected_joint = 1
+    assert live.selection == ("first", "joint_1")
+
+
+def test_removed_actor_disappears_but_the_last_one_stays(screen, live):
+    actor = live.add(bar())
+    live.remove(actor)
+    assert [each.name for each in screen.state.scene.actors] == ["first"]
+    first = live["first"]
+    with pytest.raises(ViewerError, match="at least one"):
+        live.remove(first)
+
+
+def test_figure_is_exchanged(screen, live):
+    actor = live.add(bar())
+    actor.figure, actor.pose = viewer.load().actors[0].figure, None
+    actor.__post_init__()
+    live.update()
+    assert screen.state.scene.actors[-1].figure.mesh.n_vertices == 7561
+    assert len(screen.state.scene.actors) == 2
+
+
+def test_scene_is_replaced_and_followed(screen, live):
+    scene = viewer.Scene([viewer.Actor(bar("a")), viewer.Actor(bar("b"))])
+    live.show(scene)
+    assert [each.name for each in screen.state.scene.actors] == ["a", "b"]
+    scene["a"]["joint_1"] = [0.0, 0.0, QUARTER]
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0], 0))
+    del scene.actors[0]
+    live.update()
+    assert [each.name for each in screen.state.scene.actors] == ["b"]
+
+
+def test_what_programs_send_is_no_edit(screen, live):
+    live.add(bar())["joint_1"] = [0.0, 0.0, QUARTER]
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+    screen.state.observe()
+    assert not screen.state.history.can_undo
+
+
+def test_programs_share_a_window_and_leave_what_they_sent(screen):
+    with viewer.connect(screen.path) as one, viewer.connect(screen.path) as two:
+        one.add(bar("one"))
+        actor = two["one"]
+        actor["joint_1"] = [0.0, 0.0, QUARTER]
+        screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+        assert one.counts["clients"] == 2
+    two._socket.close()  # as when a program dies
+    screen.wait(lambda: screen.server.counts.clients == 0)
+    assert [each.name for each in screen.state.scene.actors] == ["first", "one"]
+
+
+def test_closed_window_is_an_error_of_one_line(tmp_path):
+    with screen_at(tmp_path / "window.json") as screen:
+        live = viewer.connect(screen.path)
+    with pytest.raises(ViewerError, match="closed"):
+        live.update()
+    assert not live.is_open
+
+
+def test_only_the_user_on_this_machine_gets_in(screen):
+    assert screen.server._socket.getsockname()[0] == "127.0.0.1"
+    assert stat.S_IMODE(screen.path.stat().st_mode) == 0o600
+    answers = [
+        raw(screen, hello(screen, token="guess"), packed(Message("get", {}))),
+        raw(screen, hello(screen, version=2)),
+        raw(screen, packed(Message("get", {}))),
+        raw(screen, framed({"do": "hello", "token": "x" * 5000})),
+    ]
+    assert [[each.do for each in found] for found in answers] == [["error"]] * 4
+    assert screen.server.counts.refused == 4
+
+
+def test_file_that_others_can_read_is_refused(screen):
+    screen.path.chmod(0o644)
+    with pytest.raises(ViewerError, match="only you can read"):
+        viewer.connect(screen.path)
+
+
+def test_file_belongs_to_one_window(screen, tmp_path):
+    with pytest.raises(ViewerError, match="expected no other window"):
+        Server(screen.path)
+    gone = tmp_path / "gone.json"
+    gone.write_text('{"port": 9, "token": "a", "pid": 1}')
+    gone.chmod(0o600)
+    with pytest.raises(ViewerError, match="start viewer serve"):
+        viewer.connect(gone)
+    with screen_at(gone):  # the window that wrote it has crashed
+        assert json.loads(gone.read_text())["port"] != 9
+    assert not gone.exists()
+
+
+def test_missing_file_says_what_to_start(tmp_path):
+    with pytest.raises(ViewerError, match="start viewer serve"):
+        viewer.connect(tmp_path / "none.json")
+
+
+def pose_of(**changes):
+    """Return a message with a pose of the first figure, six DOFs and two joints."""
+    count = {"dofs": 6, "translations": (2, 3), "rotations": (2, 4), "scales": (2, 3)}
+    arrays = [np.ones(shape) for shape in {**count, "shape": 0, "place": 3, **changes}.values()]
+    return Message("pose", {"actor": 1, "figure_scale": 1.0}, arrays)
+
+
+@pytest.mark.parametrize(
+    ("message", "why"),
+    [
+        (Message("nonsense", {}), "unknown message nonsense"),
+        (Message("remove", {}), "actor: expected an integer"),
+        (Message("remove", {"actor": 9}), "no actor 9"),
+        (Message("time", {"time": "now"}), "expected a number"),
+        (Message("scene", {"up": "x"}), "up axis"),
+        (Message("put", {}), "expected an actor"),
+        (Message("put", {"object": {"kind": "Pose", "fields": {}}}), "Pose"),
+        (Message("camera", {"distance": -1.0}), "expected 1e-09 to"),
+        (pose_of(rotations=(3, 4)), r"expected shape \(2, 4\)"),
+        (pose_of(shape=2), "at most 0 shape weights"),
+        (Message("pose", {"actor": 1, "figure_scale": 1.0}), "expected array 0, found 0"),
+    ],
+)
+def test_bad_message_is_answered_counted_and_survived(screen, message, why):
+    screen.wait(lambda: screen.server.actors)
+    ok, bad, after = raw(screen, hello(screen), packed(message), packed(Message("get", {})))
+    assert (ok.do, bad.do, after.do) == ("ok", "error", "ok")
+    assert re.search(why, bad.facts["text"]), bad.facts["text"]
+    assert after.facts["counts"]["refused"] == 1
+
+
+def test_random_bytes_leave_the_server_at_work(screen):
+    rng = random.Random(11)
+    for _ in range(30):
+        data = bytearray(hello(screen) + packed(pose_of()))
+        for _ in range(rng.randrange(6)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        with socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream:
+            stream.sendall(data[: rng.randrange(len(data))])
+    with viewer.connect(screen.path) as live:
+        assert live.selection == ("first",)
+    screen.wait(lambda: screen.server.counts.clients == 0)
+
+
+def test_of_many_poses_the_latest_is_shown(tmp_path):
+    path = tmp_path / "window.json"
+    server = Server(path)
+    first = viewer.Actor(bar("first"))
+    server.follow([first])
+    server.start()
+    try:
+        with socket.create_connection(("127.0.0.1", server.port), 10) as stream:
+            receive = receiver(stream)
+            for data in (hello_of(path), *(packed(pose_of()) for _ in range(50))):
+                stream.sendall(data)
+                assert read(receive).do == "ok"
+        assert list(server.take_poses()) == [1]
+    finally:
+        server.close()
+
+
+def hello_of(path):
+    token = json.loads(path.read_text())["token"]
+    return packed(Message("hello", {"version": 1, "token": token}))
+
+
+def test_error_of_the_thread_is_raised_by_update(screen, live, capsys):
+    actor = live.add(bar())
+    actor.pose.dofs = np.full(6, np.nan)
+    deadline = time.monotonic() + 10
+    while not live._problem and time.monotonic() < deadline:
+        time.sleep(0.01)
+    with pytest.raises(ViewerError, match="finite"):
+        live.update()
+    assert "finite" in capsys.readouterr().err
+    actor.pose.dofs = np.zeros(6)
+    live.update()

@@ -1,0 +1,54 @@
+"""A window without OpenGL: its state, which a thread advances as the frame loop does."""
+
+import threading
+import time
+from contextlib import contextmanager
+
+from app.driver import make_state
+
+import viewer
+from viewer.app.live import Live, advance_live
+from viewer.live.server import Server
+
+PATIENCE = 10.0  # timeout of an expected event in seconds
+
+
+class Screen:
+    """A server with a scene; programs connect to ``path``."""
+
+    def __init__(self, path, scene=None):
+        self.path, self.server = path, Server(path)
+        self.state = make_state(scene or viewer.load())
+        self.state.put(Live(self.server))
+        self._is_over = False
+        self._thread = threading.Thread(target=self._run)
+        self.server.start()
+        self._thread.start()
+
+    def _run(self):
+        while not self._is_over:
+            self.state.clock.pose(self.state.actor)
+            advance_live(self.state)
+            time.sleep(0.001)
+
+    def wait(self, condition):
+        """Wait until a condition of the state is true."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, "not seen"
+            time.sleep(0.001)
+
+    def close(self):
+        self._is_over = True
+        self._thread.join()
+        self.server.close()
+
+
+@contextmanager
+def screen_at(path, scene=None):
+    """Open a screen for the duration of a block."""
+    screen = Screen(path, scene)
+    try:
+        yield screen
+    finally:
+        screen.close()

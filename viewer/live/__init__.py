@@ -1,0 +1,1 @@
+"""Windows that other programs move: messages, the server in the window, and the client."""

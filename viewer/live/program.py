@@ -1,0 +1,430 @@
+"""A window in another process, which shows what a program changes: its poses, actors and time."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import selectors
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from viewer.arguments import check_type
+from viewer.data_classes import dataclass
+from viewer.errors import RenderError, ViewerError
+from viewer.live.connection_file import file_path, read_file
+from viewer.live.messages import VERSION, Message, MessageError, Values, packed, read, receiver
+from viewer.live.objects import pack, unpack
+from viewer.live.server import POSE
+from viewer.phrases import printable
+from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.memo import NumberKey
+from viewer.rigs.pose import Pose
+from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.shape import shaped
+
+_RATE = 60.0  # times per second at which changes are looked for
+_START_SECONDS = 60.0  # in which a new window must listen
+_ANSWER_SECONDS = 90.0  # longer than a window may take
+_CLOSE_SECONDS = 5.0
+
+
+@dataclass(slots=True)
+class _Sent:
+    """What the window has of an actor."""
+
+    number: int
+    """The window's number of the actor."""
+    content: object
+    look: object
+    pose: NumberKey
+
+
+class Live:
+    """A connection to a window; changes of the actors in ``scene`` are shown at once.
+
+    A thread looks for them 60 times per second: new poses and numbers changed in place, colours,
+    placements and visibility, actors added to or removed from ``scene.actors``, and ``scene.time``.
+    """
+
+    def __init__(self, path: str | Path | None = None) -> None:
+        self.scene = Scene([])
+        """The actors that this program shows; those of others are fetched by ``live[name]``."""
+        self._sent: dict[Actor, _Sent] = {}
+        self._time: float | None = None
+        self._lock = threading.RLock()
+        self._is_over = threading.Event()
+        self._problem = ""
+        self._socket = _connected(file_path(path))
+        self._receive = receiver(self._socket)
+        self._arrivals = selectors.DefaultSelector()
+        self._arrivals.register(self._socket, selectors.EVENT_READ)
+        self._hello(path)
+        threading.Thread(target=self._follow, name="live", daemon=True).start()
+
+    def _hello(self, path: str | Path | None) -> None:
+        known = read_file(file_path(path))
+        assert known is not None  # as it has been connected
+        self._ask("hello", {"version": VERSION, "token": known.token})
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the window is still there."""
+        return not self._is_over.is_set()
+
+    def close(self) -> None:
+        """End the connection; the window stays, with all that it shows."""
+        if self.is_open:
+            with contextlib.suppress(ViewerError):
+                self.update()
+        self._leave()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __getitem__(self, name: str) -> Actor:
+        """Return an actor by its name; one that the window has of others is fetched."""
+        with self._lock:
+            own = [actor for actor in self.scene.actors if name in (actor.name, actor.title)]
+            if own:
+                return own[0]
+            for number, title in self._get()["actors"]:
+                if name == title:
+                    return self._fetched(number)
+            return self.scene[name]  # raises, with the names of this program's actors
+
+    def _fetched(self, number: int) -> Actor:
+        answer = self._ask("fetch", {"actor": number})
+        actor = unpack(answer.facts["object"], answer.arrays)
+        if not isinstance(actor, Actor):
+            raise MessageError(f"fetch: expected an actor, found {type(actor).__name__}")
+        self.scene.actors.append(actor)
+        self._sent[actor] = _Sent(number, _content(actor), _look(actor), _pose_key(actor))
+        return actor
+
+    def show(self, scene: Scene, **facts: Any) -> None:
+        """Replace what the window shows; from now on, changes of this scene are shown."""
+        check_type("scene", scene, Scene)
+        with self._lock:
+            sent, arrays = [_sendable(actor) for actor in scene.actors], list[Values]()
+            if not sent:
+                raise ViewerError("show: expected a scene with actors, found an empty one")
+            told = {"object": pack(tuple(sent), arrays), "up": scene.up, "time": scene.time}
+            told |= {name: pack(each, arrays) for name, each in facts.items() if each is not None}
+            numbers = self._ask("scene", told, arrays).facts["numbers"]
+            self.scene, self._time = scene, scene.time
+            self._sent = {
+                actor: _Sent(number, _content(actor), _look(actor), _pose_key(actor))
+                for actor, number in zip(scene.actors, numbers, strict=True)
+            }
+
+    def add(self, what: Figure | Actor) -> Actor:
+        """Add a figure or an actor to what the window shows; return the actor."""
+        check_type("add", what, Figure, Actor)
+        actor = Actor(what) if isinstance(what, Figure) else what
+        with self._lock:
+            self.scene.actors.append(actor)
+            try:
+                self.update()
+            except ViewerError:
+                self.scene.actors.remove(actor)
+                raise
+        return actor
+
+    def remove(self, actor: Actor) -> None:
+        """Remove an actor from what the window shows, and from ``scene``."""
+        with self._lock:
+            if actor not in self.scene.actors:
+                raise ViewerError(f"remove: expected an actor of the scene, found {actor!r}")
+            self.scene.actors.remove(actor)
+            self.update()
+
+    def update(self) -> None:
+        """Send all changes now, and wait until the window has them; raises errors of the thread."""
+        with self._lock:
+            problem, self._problem = self._problem, ""
+            if problem:
+                raise ViewerError(problem)
+            self._require_open()
+            for actor in [each for each in self._sent if each not in self.scene.actors]:
+                self._ask("remove", {"actor": self._sent[actor].number})
+                del self._sent[actor]
+            for actor in [*self.scene.actors]:
+                self._send_object(actor)
+            if self.scene.time is not None and self.scene.time != self._time:
+                self._ask("time", {"time": float(self.scene.time)})
+                self._time = self.scene.time
+            for actor, sent in self._sent.items():
+                self._send_changes(actor, sent)
+
+    def _send_object(self, actor: Actor) -> None:
+        """Send an actor that is new or has another figure or motion."""
+        content, known = _content(actor), self._sent.get(actor)
+        if known is not None and known.content == content:
+            return
+        arrays: list[Values] = []
+        told: dict[str, Any] = {"object": pack(_sendable(actor), arrays)}
+        if known is not None:
+            told["actor"] = known.number
+        number = self._ask("put", told, arrays).facts["number"]
+        self._sent[actor] = _Sent(number, content, _look(actor), _pose_key(actor))
+
+    def _send_changes(self, actor: Actor, sent: _Sent) -> None:
+        look = _look(actor)
+        if look != sent.look:
+            told = {
+                "actor": sent.number,
+                "visible": actor.visible,
+                "color": actor.color,
+                "opacity": actor.opacity,
+            }
+            self._ask("look", told, [np.asarray(actor.placement, np.float64)])
+            sent.look = look
+        pose = actor.pose
+        if pose is None:
+            return
+        key = sent.pose.updated(*_numbers(pose))
+        if key is sent.pose:
+            return
+        shown = _sendable(actor).pose or pose
+        facts = {"actor": sent.number, "figure_scale": float(pose.figure_scale)}
+        self._ask("pose", facts, [np.asarray(getattr(shown, name), float) for name in POSE])
+        sent.pose = key
+
+    @property
+    def time(self) -> float:
+        """Seconds on the window's timeline."""
+        return float(self._get()["time"])
+
+    @time.setter
+    def time(self, seconds: float) -> None:
+        check_type("time", seconds, float)
+        self._ask("time", {"time": float(seconds)})
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """``azimuth``, ``inclination``, ``distance`` and ``target``; some of them may be set."""
+        found: dict[str, Any] = self._get()["camera"]
+        return found
+
+    @camera.setter
+    def camera(self, values: Mapping[str, Any]) -> None:
+        plain = {
+            name: np.asarray(value, float).tolist() if name == "target" else float(value)
+            for name, value in values.items()
+        }
+        self._ask("camera", plain)
+
+    @property
+    def selection(self) -> tuple[str, ...]:
+        """The names of the actor that is chosen in the window, and of the selected joint if any."""
+        return tuple(self._get()["selection"])
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Clients of the window now, messages that it received, and those that it refused."""
+        found: dict[str, int] = self._get()["counts"]
+        return found
+
+    def _get(self) -> Mapping[str, Any]:
+        return self._ask("get", {}).facts
+
+    def _ask(self, do: str, facts: Mapping[str, Any], arrays: Sequence[Values] = ()) -> Message:
+        """Send a message and return the answer; raises ``ViewerError`` for one that is an error."""
+        data = packed(Message(do, facts, arrays))
+        with self._lock:
+            self._require_open()
+            try:
+                self._socket.sendall(data)
+                answer = read(self._receive)
+            except (OSError, EOFError):
+                self._leave()
+                raise ViewerError("the window was closed") from None
+        if answer.do == "error":
+            raise ViewerError(f"{do}: {answer.text('text')}")
+        return answer
+
+    def _require_open(self) -> None:
+        """Raise if the window was closed, also if nothing has been sent since."""
+        # Between an answer and the next message, only the end of the stream can arrive.
+        if self.is_open and self._arrivals.select(0.0):
+            self._leave()
+        if not self.is_open:
+            raise ViewerError("the window was closed")
+
+    def _follow(self) -> None:
+        """Look for changes until the connection ends."""
+        while not self._is_over.wait(1.0 / _RATE):
+            if self._problem:
+                continue  # until ``update`` has raised it
+            try:
+                self.update()
+            except ViewerError as problem:
+                if self.is_open:
+                    self._problem = str(problem)
+                    sys.stderr.write(f"viewer: {problem}\n")
+
+    def _leave(self) -> None:
+        if self.is_open:
+            self._is_over.set()
+            self._arrivals.close()
+            self._socket.close()
+
+
+class Window(Live):
+    """A window that this program has opened in another process; it closes with the program."""
+
+    def __init__(self, scene: Scene, **facts: Any) -> None:
+        check_type("scene", scene, Scene)
+        self._pid = os.getpid()
+        self._folder = Path(tempfile.mkdtemp(prefix="viewer-"))
+        self._process = _started(self._folder)
+        try:
+            super().__init__(_waited(self._process, self._folder))
+            self.show(scene, **facts)
+        except BaseException:
+            self._end()
+            raise
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        """Close the window."""
+        atexit.unregister(self.close)
+        if os.getpid() != self._pid:
+            return  # a fork of the program ends, not the program
+        if self.is_open:
+            with contextlib.suppress(ViewerError):
+                self._ask("close", {})
+        self._leave()
+        self._end()
+
+    def _end(self) -> None:
+        """Wait for the process, and end it if it does not end by itself."""
+        try:
+            self._process.wait(_CLOSE_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.terminate()
+            self._process.wait(_CLOSE_SECONDS)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def connect(path: str | Path | None = None) -> Live:
+    """Connect to a window that ``viewer serve`` has opened on this machine.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+        The connection file that ``viewer serve`` printed; by default the usual one.
+
+    Returns
+    -------
+    Live
+        A context manager with ``add``, ``remove``, ``show``, ``update``, ``time``, ``camera`` and
+        ``selection``; ``live["name"]`` is an actor of the window. What is changed on actors is
+        shown at once. At the end, the window keeps what it shows.
+
+    Raises
+    ------
+    ViewerError
+        If no window listens.
+    """
+    return Live(path)
+
+
+def _connected(path: Path) -> socket.socket:
+    """Return a connection to the window of a connection file."""
+    known = read_file(path)
+    if known is None:
+        raise ViewerError(
+            f"{printable(path, 300)}: expected the connection file of a window, found none: "
+            "start viewer serve"
+        )
+    try:
+        stream = socket.create_connection(("127.0.0.1", known.port), _ANSWER_SECONDS)
+    except OSError:
+        raise ViewerError(
+            f"{printable(path, 300)}: expected a window on port {known.port}, found none: "
+            "start viewer serve"
+        ) from None
+    # Poses are small and must not wait to be sent together.
+    stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return stream
+
+
+def _started(folder: Path) -> subprocess.Popen[bytes]:
+    """Start the process of a window, which imports this package from where it is."""
+    home = str(Path(__file__).resolve().parents[2])
+    paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+    command = [sys.executable, "-m", "viewer", "serve", "--wait"]
+    with (folder / "errors.txt").open("wb") as errors:
+        return subprocess.Popen(
+            [*command, "--connection-file", str(folder / "window.json")],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            start_new_session=True,  # Ctrl-C in the program's terminal is for the program
+        )
+
+
+def _waited(process: subprocess.Popen[bytes], folder: Path) -> Path:
+    """Return the connection file once the process listens."""
+    path, deadline = folder / "window.json", time.monotonic() + _START_SECONDS
+    while not path.exists():
+        code = process.poll()
+        if code is not None:
+            lines = (folder / "errors.txt").read_text("utf-8", "replace").splitlines()
+            told = (lines or [f"exit code {code}"])[-1].removeprefix("viewer: ")
+            kind = RenderError if code == RenderError.exit_code else ViewerError
+            raise kind(told.removeprefix("error: "))
+        if time.monotonic() > deadline:
+            process.kill()
+            raise ViewerError(f"the window did not start within {_START_SECONDS:.0f} s")
+        time.sleep(0.01)
+    return path
+
+
+def _sendable(actor: Actor) -> Actor:
+    """Return an actor as it is sent; shapes that need the files of a model are applied to it."""
+    figure, pose = actor.figure, actor.pose
+    shapes = figure.blend_shapes
+    if shapes is None or shapes.space is None or pose is None:
+        return actor
+    figure = replace(shaped(figure, pose.shape_weights), blend_shapes=None)
+    return replace(actor, figure=figure, pose=replace(pose, shape_weights=np.zeros(0)))
+
+
+def _content(actor: Actor) -> object:
+    """Return a key of what is sent as a whole: the figure and the motion."""
+    shapes, pose = actor.figure.blend_shapes, actor.pose
+    is_applied = shapes is not None and shapes.space is not None and pose is not None
+    weights = pose.shape_weights.tobytes() if is_applied and pose is not None else b""
+    return actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights
+
+
+def _look(actor: Actor) -> object:
+    return actor.visible, actor.color, actor.opacity, np.asarray(actor.placement).tobytes()
+
+
+def _pose_key(actor: Actor) -> NumberKey:
+    return NumberKey() if actor.pose is None else NumberKey(*_numbers(actor.pose))
+
+
+def _numbers(pose: Pose) -> list[Floats]:
+    """Return all numbers of a pose."""
+    return [*(getattr(pose, name) for name in POSE), np.array([pose.figure_scale])]
