@@ -401,6 +401,34 @@ def test_safe_names_are_an_option_of_the_dialog_for_bvh(moving, tmp_path):
     assert written(".npz", "Safe names", ".bvh") == [*names]  # it is disabled for other formats
 
 
+def test_page_gets_its_caption_and_divider_in_the_dialog(crowd, tmp_path):
+    _ask(crowd, tmp_path)
+    _choose_format(crowd, ".html")
+    crowd.step(2)
+    crowd.click("Divider")
+    crowd.click("Caption")
+    crowd.type("A & B")
+    crowd.click("Save###Save")
+    crowd.finish_job()
+    page = (tmp_path / "tiny.html").read_text("utf-8")
+    assert crowd.state.error == "" and "A &amp; B" in page and '"wipes":true' in page
+    # A single figure has nothing beside it, and other formats have no caption.
+    crowd.menu("menu File", "Export…")
+    (tmp_path / "pose").mkdir()
+    crowd.state.of(Files).dialog.enter(tmp_path / "pose")
+    for suffix, is_page in ((".html", True), (".obj", False)):
+        crowd.step(2)
+        _choose_format(crowd, suffix)
+        crowd.step(2)
+        if is_page:
+            crowd.click("Divider")
+            crowd.click("Caption")
+            crowd.type("C")
+    crowd.click("Save###Save")
+    crowd.finish_job()
+    assert crowd.state.error == "" and [*(tmp_path / "pose").glob("*.obj")]
+
+
 @pytest.fixture
 def paused(monkeypatch):
     """Pause the export of ``.obj`` files before anything is written."""

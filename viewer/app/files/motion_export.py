@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from imgui_bundle import imgui
@@ -18,6 +18,7 @@ from viewer.app.core.saved_work import (
     with_edited_keys,
 )
 from viewer.app.core.state import AppState, shows_errors
+from viewer.app.core.text_fields import text_field
 from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_item
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_where_to_write
@@ -37,7 +38,7 @@ from viewer.exporters import (
     suited_exporter,
 )
 from viewer.exporters._motion_paths import files_at, is_together, motion_paths, part_paths
-from viewer.exporters._options import SAFE_NAMES
+from viewer.exporters._options import SAFE_NAMES, PageOptions
 from viewer.exporters.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import Remedy, agree, all_of, counted, printable
@@ -59,7 +60,7 @@ class _Selection:
     """Whether to export all actors' motions or only the selected actor's, and how."""
 
     everyone: bool
-    safe_names: bool = False
+    options: ExportOptions = field(default_factory=ExportOptions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +85,7 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     suffixes = motion_suffixes()
     ask_where_to_write(
         state,
-        lambda state, path: save_motion(state, path, selection.everyone, selection.safe_names),
+        lambda state, path: save_motion(state, path, selection.everyone, selection.options),
         "Export motion",
         suffixes,
         f"{stem}_edited{suffix}" if suffix else f"{stem}{suffixes[0]}",
@@ -115,10 +116,37 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
     actor = _first(state, selection)
     _draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))
     suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
-    kinds = exporters_at(f"motion{suffix}")
-    why = "" if any("safe_names" in kind.options for kind in kinds) else "for .bvh only"
-    selection.safe_names = checkbox(state, "Safe names", selection.safe_names, why)
+    known = {name for kind in exporters_at(f"motion{suffix}") for name in kind.options}
+    options = selection.options
+    if "page" in known:
+        count = len(state.scene.actors) if selection.everyone else 1
+        options.page = draw_page(state, options.page, count)
+        return
+    why = "" if "safe_names" in known else "for .bvh only"
+    options.safe_names = checkbox(state, "Safe names", options.safe_names, why)
     explain(SAFE_NAMES, why)
+
+
+def options_for(state: AppState, path: Path, options: ExportOptions | None) -> ExportOptions:
+    """Return the options that apply to a file, of those that were chosen in its dialog."""
+    found = replace(options or ExportOptions(), skinning=replace(state.options.skinning))
+    if not any("page" in kind.options for kind in exporters_at(path)):
+        found.page = PageOptions()  # another format was chosen before
+    return found
+
+
+def draw_page(state: AppState, page: PageOptions, n_actors: int) -> PageOptions:
+    """Draw the options of a page with some actors on one line, and return them."""
+    facts = PageOptions.__dataclass_fields__
+    why = "" if n_actors > 1 else "for two figures or more"
+    wipes = checkbox(state, "Divider", page.wipes and not why, why)
+    explain(facts["wipes"].metadata["help"], why)
+    imgui.same_line()
+    imgui.set_next_item_width(-1.0)
+    caption = text_field("##caption", page.caption, "caption")[1]
+    note_item(state, "Caption")
+    explain(facts["caption"].metadata["help"])
+    return PageOptions(caption, wipes)
 
 
 def _moving_actors(state: AppState) -> list[Actor]:
@@ -171,7 +199,7 @@ def _is_one_file(path: Path) -> bool:
 
 @shows_errors
 def save_motion(
-    state: AppState, path: Path, everyone: bool = False, safe_names: bool = False
+    state: AppState, path: Path, everyone: bool = False, options: ExportOptions | None = None
 ) -> None:
     """Write all or none of the motions within the playback range, in the background.
 
@@ -191,7 +219,7 @@ def save_motion(
     else:
         check_folder_target(files[0], state.inputs, force=True)
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
-    options = ExportOptions(kind, skinning=replace(state.options.skinning), safe_names=safe_names)
+    options = replace(options_for(state, path, options), kind=kind)
     has_still = everyone and "pose" in EXPORTERS[kind].stores and _is_one_file(path)
     still = [each for each in state.scene.actors if has_still and each.clip is None]
     known, written = state.of(SavedWork), [one for each in motions for one in each.saved]
@@ -328,14 +356,17 @@ def _of_pose(kind: Exporter) -> Exporter:
     return replace(kind, title=title, keeps=", ".join(kept), omits=f"motion, {kind.omits}")
 
 
-def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
-    """Draw the list of formats of poses."""
+def draw_pose_formats(state: AppState, dialog: FileDialog, options: ExportOptions) -> None:
+    """Draw the list of formats of poses, and the options of the chosen one."""
     record = state.actor.figure.record
     is_vrm = record is not None and record.vrm is not None
     why = "other figures need an author and a licence, which viewer convert takes"
     formats = pose_formats()
     missing = [suffix for suffix, kind in formats.items() if "meta" in kind.options and not is_vrm]
     _draw_formats(state, dialog, formats, dict.fromkeys(missing, why))
+    suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
+    if suffix in formats and "page" in formats[suffix].options:
+        options.page = draw_page(state, options.page, 1)
 
 
 def _draw_formats(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Protocol, TypeAlias
 
@@ -14,7 +13,7 @@ from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
-from viewer.app.files.motion_export import N_ROWS, draw_pose_formats, pose_formats
+from viewer.app.files.motion_export import N_ROWS, draw_pose_formats, options_for, pose_formats
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
@@ -228,26 +227,27 @@ def ask_for_export(state: AppState) -> None:
     """Ask where to export the chosen actor in its current pose, by default with an edited rig."""
     suffixes = tuple(pose_formats())
     suffix = ".glb" if state.actor.figure in state.of(SavedWork).edited else ".obj"
+    options = ExportOptions()
     ask_where_to_write(
         state,
-        save_export,
+        lambda state, path: save_export(state, path, options),
         "Export",
         suffixes,
         f"{file_stem(state.actor.name)}{suffix}",
-        more=draw_pose_formats,
-        more_rows=N_ROWS,
+        more=lambda state, dialog: draw_pose_formats(state, dialog, options),
+        more_rows=N_ROWS + 1.5,
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 
 
 @shows_errors
-def save_export(state: AppState, path: Path) -> None:
+def save_export(state: AppState, path: Path, options: ExportOptions | None = None) -> None:
     """Write the chosen actor in its current pose for other programs, in the background."""
     files = files_written(path)
     # Edits made during the export must not change the written pose.
     actor = upright_actor(state.scene, state.actor).copy()
-    skinning = replace(state.options.skinning)
-    act, saved = lambda: export(actor, path, skinning), _saved(state.actor)
+    how = options_for(state, path, options)
+    act, saved = lambda: export(actor, path, options=how), _saved(state.actor)
     if path.suffix.lower() in _RIGS:
         saved = [*saved, state.actor.figure]
     save_in_background(state, act, files, saved=saved)
