@@ -134,6 +134,16 @@ def leak() -> Figure:
     return weighted(weights)
 
 
+def leak_everywhere(fraction: float = 0.02) -> Figure:
+    """Return the body with a head four times as large, which also moves all other vertices."""
+    mesh, head = body().mesh, joint("head")
+    away = mesh.positions - rest_joints(body())[head]
+    points = mesh.positions + 3.0 * table()[:, [head]] * away
+    weights = (1.0 - fraction) * table()
+    weights[:, head] += fraction
+    return weighted(weights, replace(body(), mesh=replace(mesh, positions=points)))
+
+
 def swapped() -> Figure:
     names = body().skeleton.names
     legs = below("left_hip") | below("right_hip")
@@ -150,10 +160,20 @@ def hard() -> Figure:
 
 
 def hard_elbow() -> Figure:
+    return weighted(hard_arm(np.ones(len(table()), dtype=bool)))
+
+
+def hard_arm(where: np.ndarray) -> np.ndarray:
     weights, arm = table().copy(), [joint("left_shoulder"), joint("left_elbow")]
-    around = weights[:, arm].sum(axis=1) > 0.9
+    around = (weights[:, arm].sum(axis=1) > 0.9) & where
     weights[around] = weights[around] == weights[around].max(axis=1, keepdims=True)
-    return weighted(weights)
+    return weights
+
+
+def mostly_hard_elbow() -> Figure:
+    """Return the body with a hard elbow, except at its upper side."""
+    mesh, elbow = body().mesh, rest_joints(body())[joint("left_elbow")]
+    return weighted(hard_arm(mesh.positions[:, 1] < elbow[1] + 0.02))
 
 
 def noisy(size: float, root: str = "pelvis") -> Callable[[], Figure]:
@@ -211,6 +231,13 @@ def renamed() -> Figure:
     return replace(body(), skeleton=replace(skeleton, names=names))
 
 
+def renamed_asymmetric() -> Figure:
+    """Return the body with exchanged names whose mesh is not symmetric: moved by up to 1 mm."""
+    mesh, rng = body().mesh, np.random.default_rng(0)
+    points = mesh.positions + rng.uniform(-1e-3, 1e-3, mesh.positions.shape)
+    return replace(renamed(), mesh=replace(mesh, positions=points))
+
+
 def limited() -> Figure:
     skeleton = body().skeleton
     limits = skeleton.dof_limits.copy()
@@ -262,11 +289,15 @@ FAULTS = {
     "stray vertex": (stray(1.0), "W011.strays", ["right_foot"], [NOSE]),
     "30 % stray": (stray(0.3), "W011.strays", ["right_foot"], [NOSE]),
     "leak": (leak, "W011.strays", ["right_foot"], "head"),
+    "leak everywhere": (leak_everywhere, "W011.strays", ["head"], None),
     "legs swapped": (
         swapped, "W013.swapped", [f"{s}_{j}" for s in ("left", "right") for j in LEG], []
     ),
     "hard everywhere": (hard, "W015.everywhere", [], None),
     "hard elbow": (hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None),
+    "mostly hard elbow": (
+        mostly_hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None
+    ),
     "noise": (noisy(0.2), "W016.noise", None, None),
     "mild noise": (noisy(0.1), "W016.alternating", None, None),
     "noise of one side": (noisy(0.05, "left_shoulder"), "W016.sides", None, None),
@@ -288,6 +319,9 @@ FAULTS = {
     "spike of 30 mm": (spiked, "M013.vertices", [], [NOSE]),
     "spike of 300 mm": (stuck_out, "M013.vertices", [], [NOSE]),
     "names swapped": (renamed, "Y004.names", ["left_knee", "right_knee"], []),
+    "names swapped, asymmetric": (
+        renamed_asymmetric, "Y004.names", ["left_knee", "right_knee"], []
+    ),
     "limits of one knee": (limited, "Y005.limits", ["left_knee", "right_knee"], []),
 }  # fmt: skip
 
@@ -304,6 +338,10 @@ def test_fault_is_found_at_its_joints_and_vertices(name):
     if vertices == "head":
         vertices = np.flatnonzero(table()[:, joint("head")] > 0.5).tolist()
     assert vertices is None or sorted(found.vertices.tolist()) == vertices
+
+
+def test_large_head_is_no_leak():
+    assert linted(leak_everywhere(0.0), (stray_weights,)) == []
 
 
 @pytest.mark.parametrize(("scale", "up"), [(0.01, "z")])
@@ -404,6 +442,16 @@ def test_twist_loses_half_of_what_moves_with_equal_weights():
     (found,) = linted(equal, (volumes,))
     assert found.code == "W017" and found.joints.tolist() == [2]
     assert "left_wrist 50 %" in found.message
+
+
+def test_equal_weights_along_most_of_a_limb_are_found_where_they_lose_less():
+    """Equal weights at |x| < 0.55: (1.1 * 50 + 0.9 * 33) / 2, 42 % of the volume are lost."""
+    x = np.array([-1.0, -0.55, -0.549, 0.549, 0.55, 1.0])
+    w = np.array([0.0, 0.5, 0.5, 0.5, 0.5, 1.0])
+    (found,) = linted(tube(lambda at: np.interp(at, x, w)), (volumes,))
+    assert found.diagnostic.key == "W017.equal" and found.joints.tolist() == [2]
+    # Rings are 0.05 apart: from -0.55 to 0.55, 23 of 12 vertices.
+    assert len(found.vertices) == 23 * 12
 
 
 @pytest.mark.parametrize("up", ["y", "z"])

@@ -23,7 +23,8 @@ _TORN = 0.05  # total difference of weights beyond rounding: a gap of 5 % of wha
 _ALL_TORN = 0.5  # fraction of seam vertices above which the parts are separate by design
 _RIGID = 0.99  # weight of a vertex that one joint moves
 _RING = 8  # minimum number of edges around a limb
-_HARD = 0.95  # minimum fraction of hard edges between two joints
+# Where two joints change without blending, a third one may still blend in, as the hip at a knee.
+_HARD = 0.5  # minimum fraction of hard edges between two joints
 # Of 40 rigs of artists, at most 38 % of the borders are hard, and where single ones are, as between
 # the joints of fingers or a tail, so are others.
 _ALL_HARD = 0.6  # fraction of all border edges above which the whole figure is hard

@@ -38,6 +38,9 @@ _TWICE = 2.0  # maximum distance relative to the reach: weights of long bones en
 _STRONG = 0.05  # smallest weight of a stray that is seen at once
 _MANY = 8  # number of vertices whose smaller weights are seen together
 _TOGETHER = 256  # vertices whose distances from others are computed together
+# In the same rigs, weights below this one of a joint are at no more than 13 % of all places, mostly
+# fewer than its larger ones: a joint leaks to the whole body if they are at many more.
+_SMALL, _EVERYWHERE = 0.1, 0.25
 # Of the same rigs, one has a group of up to three places with this much of a joint's weight that is
 # apart from all others of the joint, and blends with another one that is no neighbour of it.
 _ALONE, _ALONE_WEIGHT = 3, 0.2
@@ -107,6 +110,7 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
     leaks = (beyond > _BEYOND) & (distances > _TWICE * reach[found.joints])
     n_far, n_own = (np.bincount(found.joints[k], minlength=len(reach)) for k in (leaks, mostly))
     stray |= leaks & (n_far > n_own)[found.joints]
+    stray |= _are_everywhere(found, len(np.unique(surface.place)))
     stray |= _are_alone(found, surface, place_parts, parents) & is_minor & (distances > _NEAR)
     stray &= ~np.isin(found.joints, swapped[:, 0]) & ~_are_adjacent(found, parents)
     whole = stray & _are_islands(surface, found, parts) if stray.any() else stray
@@ -126,6 +130,18 @@ def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
     np.maximum.at(most, found.joints, score[parts])
     minor: Bools = score[parts] < most[found.joints]
     return minor
+
+
+def _are_everywhere(found: Support, n_places: int) -> Bools:
+    """Return which influences are small ones of joints that leak to the whole body: (N,)."""
+    is_small = found.place_weights < _SMALL
+    n_small, n_other = (
+        np.bincount(found.place_joints[some], minlength=int(found.joints.max()) + 1)
+        for some in (is_small, ~is_small)
+    )
+    leaks = (n_small > _EVERYWHERE * n_places) & (n_small > n_other)
+    result: Bools = leaks[found.joints] & (found.weights < _SMALL)
+    return result
 
 
 def _are_alone(found: Support, surface: Surface, part: Indices, parents: Ints) -> Bools:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.linting._finding import Finding
@@ -56,12 +57,13 @@ def check(subject: Subject) -> Iterator[Finding]:
         yield from _limits(subject, figure.skeleton)
     is_whole = not subject.lacks("positions", "weights", "bindings", "joints")
     if figure.mesh is not None and figure.is_attached and is_whole:
-        yield from _joints(subject, figure)
+        plane = _plane(figure)
+        if plane is not None:
+            yield from _joints(subject, figure, plane)
+            yield from _names(subject, figure, plane)
         mirror = mirror_of(figure)
-        if mirror is not None:
-            yield from _names(subject, figure, mirror)
-            if figure.symmetry is None:
-                yield from _sides(subject, figure, mirror)
+        if mirror is not None and figure.symmetry is None:
+            yield from _sides(subject, figure, mirror)
     if figure.symmetry is None or figure.mesh is None:
         return
     yield from _positions(subject, figure, figure.mesh)
@@ -182,21 +184,38 @@ def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding
     )
 
 
-def _joints(subject: Subject, figure: Figure) -> Iterator[Finding]:
-    """Report joints that are not at the mirrored position of their counterpart."""
-    skin, skeleton = figure.require_skin(), figure.require_skeleton()
-    size, partners = subject.size(), name_partners(skeleton)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plane:
+    """Plane between the joints of most pairs, whatever the mesh is like."""
+
+    axis: int
+    centre: float
+    """The axis along which they are apart, and the middle between them."""
+    places: Floats
+    """(J, 3): the joints in the bind pose."""
+    partners: Ints
+    """(J,): counterpart of each joint by name."""
+    pairs: Bools
+    """(J,): joints that have another one as counterpart, if both move vertices."""
+
+
+def _plane(figure: Figure) -> _Plane | None:
+    skin, partners = figure.require_skin(), name_partners(figure.require_skeleton())
     moves = moves_vertices(skin)
     pairs = (partners >= 0) & (partners != np.arange(len(partners))) & moves & moves[partners]
     if pairs.sum() < _PAIRS:
-        return
-    # The plane is that of most pairs, whatever the mesh is like: perpendicular to the axis along
-    # which they are apart, through the middle between them.
+        return None
     places = bind_positions(skin)
-    apart = np.abs(places - places[partners])[pairs]
-    axis = int(np.median(apart, axis=0).argmax())
+    axis = int(np.median(np.abs(places - places[partners])[pairs], axis=0).argmax())
     centre = float(np.median(0.5 * (places + places[partners])[pairs, axis]))
-    errors = np.linalg.norm(reflected(places, axis, centre) - places[partners], axis=1)
+    return _Plane(axis, centre, places, partners, pairs)
+
+
+def _joints(subject: Subject, figure: Figure, plane: _Plane) -> Iterator[Finding]:
+    """Report joints that are not at the mirrored position of their counterpart."""
+    size, skeleton, pairs = subject.size(), figure.require_skeleton(), plane.pairs
+    images = reflected(plane.places, plane.axis, plane.centre)
+    errors = np.linalg.norm(images - plane.places[plane.partners], axis=1)
     off = np.flatnonzero(pairs & (errors > _UNLIKE * size))
     if len(off) == 0 or np.median(errors[pairs]) > _ALIKE * size:
         return
@@ -218,10 +237,10 @@ def _joints(subject: Subject, figure: Figure) -> Iterator[Finding]:
     )
 
 
-def _names(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding]:
+def _names(subject: Subject, figure: Figure, plane: _Plane) -> Iterator[Finding]:
     """Report joints named after the other side than most."""
     skeleton = figure.require_skeleton()
-    places = bind_positions(figure.require_skin())[:, mirror.axis] - mirror.centre
+    places = plane.places[:, plane.axis] - plane.centre
     sides = np.array([_SIDES[side] for side, _ in sided_words(skeleton.names)])
     signs = np.where(np.abs(places) > _ASKEW * subject.size(), np.sign(places), 0.0) * sides
     usual = np.sign(signs.sum())

@@ -1,4 +1,4 @@
-"""Check of weights for volume that a joint loses in a test pose: candy wrappers."""
+"""Checks of weights around a joint: volume lost in a test pose (candy wrappers), equal weights."""
 
 from __future__ import annotations
 
@@ -29,10 +29,18 @@ _ANGLE = np.radians(90.0)  # about the bone that ends at the joint: a forearm tw
 _LOST = 0.48
 _BLENDS = 0.02  # smallest weight, and distance from 1, of a vertex that blends
 _FEWEST = 24  # minimum number of triangles
+# Weights that change from 1 to 0 are equal at a single ring at most. In 40 rigs of artists, a joint
+# has the same weight as its parent at one vertex, or at none.
+_SAME = 1e-3  # maximum difference of equal weights
+_EQUAL, _FEWEST_EQUAL = 0.5, 12  # minimum fraction of the joint's vertices, and their number
+_BOTH = (
+    0.9,
+    0.5,
+)  # minimum sum of both weights: of those that are equal, and of the joint's vertices
 
 
 def check(subject: Subject) -> Iterator[Finding]:
-    """Twist elbows, wrists, knees and ankles by 90 degrees, and compare volumes."""
+    """Check elbows, wrists, knees and ankles."""
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None or not figure.is_attached:
         return
@@ -44,17 +52,32 @@ def check(subject: Subject) -> Iterator[Finding]:
     places = bind_positions(figure.skin)
     lost: list[tuple[float, int]] = []
     blending: list[Indices] = []
+    equal: dict[int, Indices] = {}
     for joint, meaning in enumerate(joint_meanings(skeleton)):
         parent = int(skeleton.parents[joint])
         if parent >= 0 and meaning.endswith(_LIMBS):
             axis = places[joint] - places[parent]
             fraction, vertices = _twisted(figure, whole, joint, places[joint], axis)
+            halves = _equal(whole, joint, parent)
             if fraction > _LOST:
                 lost.append((fraction, joint))
                 blending.append(vertices)
+            elif len(halves):
+                equal[joint] = halves
+    labels = joint_labels(skeleton)
+    if equal:
+        vertices = np.concatenate([*equal.values()])
+        yield subject.found(
+            "W017.equal: {n} half the weight of a joint and half of its parent, all along: {names}",
+            n=counted(len(vertices), "vertex", "has", "have"),
+            names=listed([labels[joint] for joint in equal]),
+            vertices=vertices,
+            joints=[*equal],
+            at=("weights", int(vertices[0])),
+        )
     if not lost:
         return
-    labels, order = joint_labels(skeleton), np.argsort([-each for each, _ in lost])
+    order = np.argsort([-each for each, _ in lost])
     names = [
         Phrase("{joint} {percent} %", joint=labels[lost[k][1]], percent=round(100.0 * lost[k][0]))
         for k in order
@@ -69,6 +92,18 @@ def check(subject: Subject) -> Iterator[Finding]:
         joints=[lost[k][1] for k in order],
         at=("bindings", lost[int(order[0])][1]),
     )
+
+
+def _equal(skin: Skin, joint: int, parent: int) -> Indices:
+    """Return the vertices with equal weights of a joint and its parent, if most of its are so."""
+    own, other = (
+        np.bincount(owners(skin), np.where(skin.joints == each, skin.weights, 0.0), skin.n_vertices)
+        for each in (joint, parent)
+    )
+    are_equal = np.flatnonzero((np.abs(own - other) < _SAME) & (own + other > _BOTH[0]))
+    n_own = np.count_nonzero((own > _BLENDS) & (own + other > _BOTH[1]))
+    is_usual = len(are_equal) < max(_FEWEST_EQUAL, _EQUAL * n_own)
+    return are_equal[: 0 if is_usual else None]
 
 
 def _twisted(
