@@ -5,13 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs.hand_made import matrix, plain_kinematics, skeleton, turn_x, turn_y, turn_z
 
+from viewer.errors import RigError
 from viewer.rigs.kinematics import (
     forward_kinematics,
     joint_worlds,
     skinning_matrices,
     world_matrices,
 )
-from viewer.rigs.pose import local_matrices, rest_pose
+from viewer.rigs.pose import Pose, local_matrices, rest_pose
 
 ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
 
@@ -109,6 +110,31 @@ def test_rest_poses_share_no_array_with_each_other_or_the_skeleton():
     pose.dofs[0] = pose.translations[0, 0] = 7.0
     assert rest_pose(joint).dofs.tolist() == [0.5]
     assert joint.rest_translations[0, 0] == 0.0
+
+
+def test_parts_of_a_pose_are_views_and_copy_what_is_assigned():
+    pose = rest_pose(skeleton([-1, 0], [(0, "x", 0.0), (1, "z", 0.0)]))
+    pose.dofs, pose.translations = np.array([1.0, 2.0]), np.arange(3.0, 9.0).reshape(2, 3)
+    quaternions = np.arange(9.0, 17.0).reshape(2, 4)
+    pose.rotations, pose.scales = quaternions, np.arange(17.0, 23.0).reshape(2, 3)
+    pose.figure_translation = np.array([23.0, 24.0, 25.0])
+    assert pose.values.tolist() == list(range(1, 26))
+    quaternions[:] = 0.0
+    pose.scales[1, 2] *= 2.0
+    held = pose.rotations
+    held[0, 0] = -9.0
+    assert (pose.rotations[0, 0], pose.rotations[1, 3], pose.scales[1, 2]) == (-9.0, 16.0, 44.0)
+    with pytest.raises(ValueError, match="broadcast"):
+        pose.dofs = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("values", "n_dofs"), [(np.zeros(16), 2), (np.zeros((5, 3)), 2), (np.zeros(12), -1)]
+)
+def test_poses_refuse_values_that_are_not_those_of_whole_joints(values, n_dofs):
+    assert Pose(np.zeros(15), 2).rotations.shape == (1, 4)
+    with pytest.raises(RigError, match="values of a pose"):
+        Pose(values, n_dofs)
 
 
 def test_copy_of_a_pose_shares_no_array():

@@ -326,12 +326,9 @@ def _scaled(skeleton: Skeleton, pose: Pose) -> tuple[Pose, Floats]:
     """Return a pose with the lengths of the scaled figure, and the translations of its joints."""
     factor = pose.figure_scale
     moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
-    scaled = replace(
-        pose.copy(),
-        figure_scale=1.0,
-        translations=factor * pose.translations,
-        shape_weights=np.zeros(0),  # applied already
-    )
+    # The shape is applied already.
+    scaled = replace(pose.copy(), figure_scale=1.0, shape_weights=np.zeros(0))
+    scaled.translations *= factor
     scaled.dofs[moves] *= factor
     moved = scaled.translations.copy()
     np.add.at(moved, (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), scaled.dofs[moves])

@@ -270,22 +270,22 @@ class Server:
 
     def _pose(self, message: Message, actor: Actor) -> Pose:
         """Return the pose of a message, which must fit the actor's figure."""
-        own = actor.require_pose()
-        values: dict[str, Any] = {}
+        pose = actor.require_pose().copy()
         for index, name in enumerate(POSE):
-            shape = getattr(own, name).shape
             is_free = name == "shape_weights"
-            values[name] = message.array(index, (None,) if is_free else shape)
-        if len(values["shape_weights"]) > actor.figure.n_shapes:
+            shape = (None,) if is_free else getattr(pose, name).shape
+            setattr(pose, name, message.array(index, shape))
+        if len(pose.shape_weights) > actor.figure.n_shapes:
             raise MessageError(
                 f"pose: expected at most {actor.figure.n_shapes} shape weights, found "
-                f"{len(values['shape_weights'])}"
+                f"{len(pose.shape_weights)}"
             )
-        lengths = np.linalg.norm(values["rotations"], axis=1, keepdims=True)
+        lengths = np.linalg.norm(pose.rotations, axis=1, keepdims=True)
         if not lengths.all():
             raise MessageError("pose: expected unit quaternions, found zeros")
-        values["rotations"] /= lengths
-        return Pose(figure_scale=message.number("figure_scale"), **values)
+        pose.rotations /= lengths
+        pose.figure_scale = message.number("figure_scale")
+        return pose
 
 
 def _content(message: Message) -> Any:

@@ -14,8 +14,8 @@ from viewer.rendering.options import Color, DisplayOptions
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import rigid_sizes
-from viewer.rigs.motion.instances import PoseArrays, PoseTable, placements
-from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.motion.instances import ArrayTable, placements
+from viewer.rigs.pose import Pose, PoseArrays, placement_matrix, pose_arrays_of
 from viewer.rigs.scene import Actor
 
 FEWEST = 8
@@ -61,8 +61,8 @@ class Crowd:
         self.version = self.placement_version = self._order_version = 0
         self.models: Floats = np.zeros((0, 4, 4))
         self.colors: list[Color | None] = []
-        self._table = PoseTable()
-        self._placed: tuple[Floats, Floats, list[float]] = np.zeros(0), np.zeros(0), []
+        self._table, self._places = ArrayTable(), ArrayTable()
+        self._scales: list[float] = []
         self._placed_opacities: Floats = np.zeros(0)
         self._reflected: Bools = np.zeros(0, dtype=np.bool_)
         self._key: tuple[object, ...] = ()
@@ -71,8 +71,7 @@ class Crowd:
     @property
     def arrays(self) -> PoseArrays:
         """The values of all poses at the last update."""
-        assert self._table.arrays is not None  # just updated
-        return self._table.arrays
+        return pose_arrays_of(self._table.values, self.poses[0].n_dofs)
 
     @property
     def is_translucent(self) -> bool:
@@ -81,30 +80,31 @@ class Crowd:
 
     def update(self) -> None:
         """Gather the values of all actors, and raise the versions of what changed."""
-        changed = self._table.update(self.poses)
-        if changed is not None:
-            self.version += 1
-            self.versions[changed] = self.version
-        self._place(self.poses)
+        differ = self._table.update([pose.values for pose in self.poses])
+        if differ is not None:
+            changed = differ[:, :-3].any(axis=1)
+            if changed.any():
+                self.version += 1
+                self.versions[changed] = self.version
+        # The last three numbers translate the whole figure.
+        self._place(differ is not None and bool(differ[:, -3:].any()))
 
-    def _place(self, poses: list[Pose]) -> None:
-        places = np.concatenate([actor.placement for actor in self.actors])
-        shifts = np.concatenate([pose.figure_translation for pose in poses])
-        scales = [pose.figure_scale for pose in poses]
+    def _place(self, is_shifted: bool) -> None:
+        moved = self._places.update([actor.placement for actor in self.actors])
+        scales = [pose.figure_scale for pose in self.poses]
         colors = [actor.color for actor in self.actors]
-        old = self._placed
-        is_turned = scales != old[2] or not np.array_equal(places, old[0])
+        is_turned = moved is not None or scales != self._scales
         is_faded = not np.array_equal(self.opacities, self._placed_opacities)
-        is_same = colors == self.colors and np.array_equal(shifts, old[1])
-        if is_same and not (is_turned or is_faded):
+        if not (is_turned or is_shifted or is_faded or colors != self.colors):
             return
-        self.models, self.colors = places.reshape(-1, 4, 4) @ placements(poses), colors
+        placed = self._places.values.reshape(-1, 4, 4)
+        self.models, self.colors = placed @ placements(self.poses), colors
         if is_turned:
             reflected = np.linalg.det(self.models[:, :3, :3]) < 0.0
             self._order_version += not np.array_equal(reflected, self._reflected)
             self._reflected = reflected
         self._order_version += is_faded
-        self._placed, self._placed_opacities = (places, shifts, scales), self.opacities
+        self._scales, self._placed_opacities = scales, self.opacities
         self.placement_version += 1
 
     def joint_groups(self) -> list[Group]:
@@ -210,24 +210,23 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
 
     The crowds are up to date.
     """
-    # What an actor draws, but for the numbers of poses and placements. Tuples of the same objects
+    # What an actor draws, but for the numbers of poses and placements. Lists of the same objects
     # are compared quickly.
-    states = [
-        (
-            actor.figure,
-            actor.pose,
-            actor.visible,
-            actor.is_present,
-            actor.opacity,
-            actor.hidden_parts,
-            actor.points is None,
-        )
-        for actor in actors
-    ]
-    shapes = [b"" if a.pose is None else a.pose.shape_weights.tobytes() for a in actors]
+    poses = [actor.pose for actor in actors]
+    states = (
+        [actor.figure for actor in actors],
+        poses,
+        [actor.visible for actor in actors],
+        [actor.is_present for actor in actors],
+        [actor.opacity for actor in actors],
+        [actor.hidden_parts for actor in actors],
+        [actor.points is None for actor in actors],
+    )
+    weights = [pose.shape_weights for pose in poses if pose is not None]
+    shapes = list(map(len, weights)), np.concatenate([np.zeros(0), *weights]).tobytes()
     views = options.show, options.shading == "scalar", options.wireframe, options.normals
     shown = options.opacity, options.captured_keypoints, options.keypoints
-    key = list(actors), states, shapes, views, shown, FEWEST
+    key = list(actors), *states, shapes, views, shown, FEWEST
     if key != before.key:
         drawn = [actor for actor in actors if actor.is_drawn]
         before = Lineup(

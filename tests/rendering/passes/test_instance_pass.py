@@ -1,5 +1,6 @@
 """Actors drawn as instances, compared with the float64 reference and images of single actors."""
 
+import sys
 from collections import Counter
 from dataclasses import replace
 
@@ -514,6 +515,45 @@ def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
     done = draw("normal")
     assert (done.get("transform", 0), done["write"]) == (0, 100 * 19 * 4)
     assert draw("final").get("write", 0) == 0
+
+
+def test_frames_of_200_actors_call_no_more_functions_than_those_of_20(offscreen):
+    size, options, calls = (16, 12), DisplayOptions(quality="normal"), {}
+
+    def count(_frame, event, _value) -> None:
+        done[event] += 1
+
+    for number in (20, 200):
+        scene = crowd(number)
+        camera, box = default_camera(scene, size), scene_box(scene)
+        for angle in (0.0, 0.1, 0.1, 0.2):  # programs, caches and the background are made at first
+            for actor in scene.actors:
+                actor.pose.dofs[3] = angle
+            camera.azimuth += 10.0
+            done = Counter()
+            with offscreen.context:
+                target = offscreen.target(size, 1)
+                sys.setprofile(count)
+                try:
+                    offscreen.renderer.draw(scene, camera, options, target, box)
+                finally:
+                    sys.setprofile(None)
+            calls.setdefault(number, []).append((done["call"], done["c_call"]))
+    *_, still, moving = (np.subtract(*pair) for pair in zip(calls[200], calls[20], strict=True))
+    # One call per actor would be 180 more; whether values are skipped may make one or two.
+    assert still.tolist() == [0, 0] and (moving < 10).all()
+
+
+@pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
+def test_large_crowds_are_skinned_in_parts(ctx, monkeypatch, how):
+    monkeypatch.setattr(posed_vertices, "_MOST_TOGETHER", 4)
+    figure = random_figure(np.random.default_rng(8), 12)
+    instances, actors = Instances(ctx, figure), cast(figure, 9)
+    check(instances, actors, how)
+    for number in (0, 3, 4, 7, 8, 1):
+        actors[number].pose.rotations[2] = 0.6, 0.0, 0.0, 0.8
+    check(instances, actors, how)
+    instances.release()
 
 
 def crowd_and_one() -> Scene:

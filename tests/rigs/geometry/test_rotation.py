@@ -1,5 +1,7 @@
 """Rotations, quaternions and transforms."""
 
+import math
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -428,6 +430,21 @@ def test_products_equal_those_multiplied_one_by_one(shape):
     found = axis_products(4, joints, axes, rows).at(dofs)
     assert found.shape == (*shape, 4, 3, 3)
     assert_allclose(found, expected, atol=1e-15)
+
+
+def test_products_are_exact_at_all_angles():
+    """The half-angle formula has poles at odd multiples of pi, which no float equals."""
+    one, quarters = np.zeros(1, dtype=np.int32), np.arange(-8, 9) * (math.pi / 2)
+    angles = np.concatenate([quarters, np.nextafter(quarters, 9.0), [1e-300, 1e-9, 3.0, 1e6]])
+    found = axis_products(1, one, one, np.zeros(1, np.intp)).at(angles[:, None])[:, 0]
+    expected = [[[1, 0, 0], [0, c, -s], [0, s, c]] for c, s in map(cos_and_sin, angles.tolist())]
+    assert_allclose(found, expected, atol=4e-16)
+    # Small angles keep their relative precision.
+    assert_allclose(found[-4:-2, 2, 1], angles[-4:-2], rtol=1e-15)
+
+
+def cos_and_sin(angle: float) -> tuple[float, float]:
+    return math.cos(angle), math.sin(angle)
 
 
 def test_joints_without_rotations_have_the_identity():

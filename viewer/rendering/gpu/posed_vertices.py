@@ -34,7 +34,9 @@ _SAMPLERS = {"u_palette": 0, "u_pairs": 1, "u_rigid": 2, "u_places": 3}
 BYTES_PER_VERTEX = 24
 """A position and a normal, of three float32 each."""
 
-_MOST_TOGETHER = 1024  # maximum number of actors in one upload
+# Maximum number of actors in one upload. The matrices of so many fit into the processor's cache,
+# and the memory of one upload serves the next; larger arrays cost a page fault per 4 KB and frame.
+_MOST_TOGETHER = 256
 _MOST_RESTS = 64 << 20  # maximum size of the rest positions with correctives in one upload, bytes
 
 
@@ -55,7 +57,8 @@ class PosedVertices:
         self._shared: SharedVertices | None = None
         self.centers: Floats = np.zeros((0, 3))
         self._textures: dict[str, moderngl.Texture] = {}
-        self._together = max(1, min(_MOST_TOGETHER, _MOST_RESTS // mesh.positions.size))
+        self.together = max(1, min(_MOST_TOGETHER, _MOST_RESTS // mesh.positions.size))
+        """Maximum number of actors that ``skin`` accepts."""
         self._room = 0  # number of actors in the textures
         self._rest = RestBuffers(context, programs, mesh)
         self._arrays = VertexArrays(context)
@@ -76,7 +79,7 @@ class PosedVertices:
             self._own = checked(self.context, self.context.buffer(reserve=room * self.size), what)
         self.centers = np.tile(self.mesh.center, (room, 1))
         self._free_textures()
-        self._room = min(room, self._together)
+        self._room = min(room, self.together)
         for name in ("u_palette", "u_places"):
             self._texture(name)
 
@@ -104,19 +107,18 @@ class PosedVertices:
         weights: Floats | None,
         sizes: Floats,
     ) -> Bools:
-        """Skin the actors ``rows``, (C,) ascending, of one shaped figure; return which are rigid.
+        """Skin at most ``together`` actors of one shaped figure; return which are rigid.
 
-        ``matrices``: (C, J, 4, 4) skinning matrices, bind to posed; they are changed. ``weights``:
-        (C, P) of the pose correctives, if used. ``sizes``: ``palette_sizes`` of the matrices.
+        ``rows``: (C,) ascending. ``matrices``: (C, J, 4, 4) skinning matrices, bind to posed; they
+        are changed. ``weights``: (C, P) of the pose correctives, if used. ``sizes``:
+        ``palette_sizes`` of the matrices.
         """
         self._rest.reshape(figure)
         self.centers[rows] = self._move_origins(how, matrices)
         rigid = np.broadcast_to(are_rigid(sizes), len(rows))
-        for start in range(0, len(rows), self._together):
-            part = slice(start, start + self._together)
-            self._upload(figure, how, matrices[part], self.centers[rows[part]])
-            self._rest.correct(None if weights is None else weights[part])
-            self._run(rows[part], how, not rigid[part].all())
+        self._upload(figure, how, matrices, self.centers[rows])
+        self._rest.correct(weights)
+        self._run(rows, how, not rigid.all())
         return rigid
 
     def unpose(self) -> None:

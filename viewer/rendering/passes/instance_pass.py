@@ -37,7 +37,7 @@ from viewer.rendering.passes.mesh_pass import (
     shading_of,
 )
 from viewer.rendering.view import View, set_lights
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, span
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import palette_sizes, skinning_matrices
 from viewer.rigs.motion.instances import worlds
@@ -145,9 +145,14 @@ class InstanceBuffers:
         self._versions, self._state = versions, state
 
     def _skin(self, rows: Rows) -> None:
+        figure = self._figure = shaped(self.mesh.figure, self._group.crowd.shape_weights)
+        for start in range(0, len(rows), self.vertices.together):
+            self._skin_some(rows[start : start + self.vertices.together], figure)
+
+    def _skin_some(self, rows: Rows, figure: Figure) -> None:
         crowd, how, chosen = self._group.crowd, self._how, self._group.rows[rows]
-        arrays, figure = crowd.arrays.rows(chosen), shaped(self.mesh.figure, crowd.shape_weights)
         skeleton, skin = figure.require_skeleton(), figure.require_skin()
+        arrays = crowd.arrays.rows(chosen)
         rotations = local_rotations(skeleton, arrays.rotations, arrays.dofs)
         matrices = skinning_matrices(worlds(skeleton, arrays, rotations), skin.inverse_bind)
         sizes = palette_sizes(skin, arrays.scales, matrices)
@@ -155,14 +160,14 @@ class InstanceBuffers:
         if self._spheres.shape[:2] != (self.count, spheres.shape[1]):
             self._spheres = np.zeros((4, spheres.shape[1], self.count)).T
             self._has_one_side = np.zeros(self.count, dtype=np.bool_)
-        self._spheres[rows] = spheres
+        which = span(rows)
+        self._spheres[which] = spheres
         weights = None
         if figure.correctives is not None and how.correctives:
             poses = [crowd.poses[row] for row in chosen.tolist()]
             weights = _pose_weights(figure, poses, rotations)
         rigid = self.vertices.skin(rows, figure, how, matrices, weights, sizes)
-        self._has_one_side[rows] = rigid | have_one_side(matrices) if not rigid.all() else True
-        self._figure = figure
+        self._has_one_side[which] = rigid | have_one_side(matrices) if not rigid.all() else True
 
     def _place(self) -> None:
         """Upload the placements, which include the posed centres, the colours and opacities."""
