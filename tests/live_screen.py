@@ -9,6 +9,7 @@ from app.driver import make_state
 import viewer
 from viewer.app.live import Live, advance_live
 from viewer.live.server import Server
+from viewer.live.vmc import Receiver
 
 PATIENCE = 10.0  # timeout of an expected event in seconds
 
@@ -16,10 +17,11 @@ PATIENCE = 10.0  # timeout of an expected event in seconds
 class Screen:
     """A server with a scene; programs connect to ``path``."""
 
-    def __init__(self, path, scene=None):
+    def __init__(self, path, scene=None, vmc=False):
         self.path, self.server = path, Server(path)
         self.state = make_state(scene or viewer.load())
-        self.state.put(Live(self.server))
+        receiver = Receiver("127.0.0.1", 0) if vmc else None
+        self.live = self.state.put(Live(self.server, receiver))
         self._is_over = False
         self._thread = threading.Thread(target=self._run)
         self.server.start()
@@ -41,13 +43,18 @@ class Screen:
     def close(self):
         self._is_over = True
         self._thread.join()
-        self.server.close()
+        self.live.close()
+
+
+def can_undo(state):
+    """Return whether there was an edit of the user; it is undone."""
+    return state.history.undo(state.scene, state.options, lambda time: None)
 
 
 @contextmanager
-def screen_at(path, scene=None):
+def screen_at(path, scene=None, vmc=False):
     """Open a screen for the duration of a block."""
-    screen = Screen(path, scene)
+    screen = Screen(path, scene, vmc)
     try:
         yield screen
     finally:

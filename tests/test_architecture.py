@@ -45,7 +45,7 @@ PARTS = {
     "rendering": {"rigs", "interrupts", "resources"},
     "exporters": {"autorig", "formats", "media", "rendering", "rigs", "interrupts"},
     "loading": {"formats", "models", "rigs", "interrupts"},
-    "live": {"rigs"},
+    "live": {"exporters", "formats", "rigs"},
     "app": {
         *("autorig", "exporters", "formats", "linting", "live", "loading", "manual", "media"),
         *("models", "rendering", "rigs", "interrupts", "resources"),

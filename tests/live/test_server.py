@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 from live.test_messages import framed
-from live_screen import screen_at
+from live_screen import can_undo, screen_at
 
 import viewer
 from viewer.errors import ViewerError
@@ -162,7 +162,7 @@ def test_what_programs_send_is_no_edit(screen, live):
     live.add(bar())["joint_1"] = [0.0, 0.0, QUARTER]
     screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
     screen.state.observe()
-    assert not screen.state.history.can_undo
+    assert not can_undo(screen.state)
 
 
 def test_programs_share_a_window_and_leave_what_they_sent(screen):

@@ -17,9 +17,11 @@ from viewer.errors import ViewerError
 from viewer.live.messages import Message, MessageError
 from viewer.live.objects import unpack
 from viewer.live.server import Request, Server
+from viewer.live.vmc import Receiver, Sender, TPose, is_humanoid, perform, performed, t_pose
 from viewer.phrases import counted
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
+from viewer.rigs.pose import pose_key
 from viewer.rigs.scene import Actor, Scene
 
 _CAMERA = {"azimuth": (-1e9, 1e9), "inclination": (-90.0, 90.0), "distance": (1e-9, 1e12)}
@@ -31,16 +33,28 @@ class Live:
     """The server of a window that other programs may change."""
 
     server: Server | None = None
+    vmc_in: Receiver | None = None
+    vmc_out: Sender | None = None
+    """Motion in VMC protocol, of the first humanoid of the scene."""
+    humanoid: TPose | None = None
+    """That humanoid, once it was moved or sent."""
+    sent: object = None
+    """Key of the pose that was sent last."""
+    lacks_humanoid: Scene | None = None
+    """Scene without a humanoid, about which a message was shown."""
 
     @property
     def has_news(self) -> bool:
         """Whether something was received that the next frame must show."""
-        return self.server is not None and self.server.has_news
+        parts = (self.server, self.vmc_in)
+        return any(part is not None and part.has_news for part in parts)
 
     def wake_by(self, wake: Callable[[], None]) -> None:
         """Let threads call a function when a frame has to be drawn."""
         if self.server is not None:
             self.server.wake = wake
+        if self.vmc_in is not None:
+            self.vmc_in.wake = wake
 
     def lines(self) -> list[tuple[str, str]]:
         """Return what was received, for the Stats panel."""
@@ -48,7 +62,21 @@ class Live:
             return []
         counts = self.server.counts
         messages = f"{counted(counts.messages, 'message')}, {counts.refused:,} refused"
-        return [("Live", f"{counted(counts.clients, 'program')}, {messages}")]
+        found = [("Live", f"{counted(counts.clients, 'program')}, {messages}")]
+        if self.vmc_in is not None:
+            packets = self.vmc_in.counts
+            text = f"{counted(packets.packets, 'packet')}, {packets.malformed:,} malformed"
+            found.append(("VMC in", text))
+        if self.vmc_out is not None:
+            packets = self.vmc_out.counts
+            found.append(("VMC out", counted(packets.packets, "packet")))
+        return found
+
+    def close(self) -> None:
+        """End all connections."""
+        for part in (self.server, self.vmc_in, self.vmc_out):
+            if part is not None:
+                part.close()
 
 
 def advance_live(state: AppState) -> None:
@@ -72,9 +100,55 @@ def advance_live(state: AppState) -> None:
         # The actor may have been replaced since the pose was checked.
         if actor is not None and actor.pose is not None and _fits(actor, pose.dofs, pose.rotations):
             actor.pose = pose
-    if poses:
+    if _perform(state, live) or poses:
         state.history.follow(state.update_version(), state.clock.time)
+    _send_performance(state, live)
     state.stats.live = live.lines()
+
+
+def _perform(state: AppState, live: Live) -> bool:
+    """Move the humanoid of the scene as a performer does; return whether it moved."""
+    receiver = live.vmc_in
+    if receiver is None or not receiver.has_news:
+        return False
+    given = receiver.take()
+    actor = _humanoid(state, live) if given.is_loaded else None
+    if actor is None or live.humanoid is None:
+        return False
+    actor.pose = perform(live.humanoid, actor.require_pose(), given)
+    return True
+
+
+def _send_performance(state: AppState, live: Live) -> None:
+    """Send the pose of the humanoid of the scene if it has changed."""
+    sender = live.vmc_out
+    actor = None if sender is None else _humanoid(state, live)
+    if sender is None or actor is None or live.humanoid is None:
+        return
+    key = actor.figure, pose_key(actor.require_pose())
+    if key != live.sent:
+        live.sent = key
+        sender.send(performed(live.humanoid, actor.require_pose()))
+
+
+def _humanoid(state: AppState, live: Live) -> Actor | None:
+    """Return the first humanoid of the scene; without one, show a message once."""
+    known = live.humanoid
+    for actor in state.scene.actors:
+        if known is not None and actor.figure is known.figure:
+            return actor
+    for actor in state.scene.actors:
+        if is_humanoid(actor.figure):
+            live.humanoid = t_pose(actor.figure)
+            return actor
+    live.humanoid = None
+    if live.lacks_humanoid is not state.scene:
+        live.lacks_humanoid = state.scene
+        state.say(
+            "VMC: expected a figure with the bones of a humanoid, found none; open one, such as "
+            "a VRM character"
+        )
+    return None
 
 
 def _fits(actor: Actor, *arrays: np.ndarray[Any, Any]) -> bool:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from viewer.commands import view
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass, setting
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from viewer.app.live import Live
@@ -27,6 +29,17 @@ class ServeOptions:
         metavar="FILE",
     )
     wait: bool = setting(False, "open the window when a program sends a scene")
+    vmc_in: str = setting(
+        "",
+        "move the first humanoid as motion capture in VMC protocol does, received at a UDP port "
+        "(usually 39539), of this machine only unless an address of it is given",
+        metavar="[HOST:]PORT",
+    )
+    vmc_out: str = setting(
+        "",
+        "send its motion in VMC protocol to a UDP port, of this machine unless a host is given",
+        metavar="[HOST:]PORT",
+    )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,19 +53,35 @@ def run(arguments: argparse.Namespace) -> int:
     from viewer.app.display import find_display
     from viewer.app.live import Live
     from viewer.live.server import Server
+    from viewer.live.vmc import Receiver, Sender
 
     settings = settings_of(ServeOptions, arguments)
     find_display()
+    receives, sends = _address("--vmc-in", settings.vmc_in), _address("--vmc-out", settings.vmc_out)
     server = Server(settings.connection_file or None)
+    live = Live(server)
     try:
+        live.vmc_in = None if receives is None else Receiver(*receives)
+        live.vmc_out = None if sends is None else Sender(*sends)
         server.start()
         print(f"listening on 127.0.0.1:{server.port}; connection file {server.path}", flush=True)
-        live = Live(server)
         if settings.wait:
             return _show_first_scene(server, live)
         return view.open_window(arguments, live=live)
     finally:
-        server.close()
+        live.close()
+
+
+def _address(option: str, text: str) -> tuple[str, int] | None:
+    """Return host and port of an option; None if it is not given."""
+    if not text:
+        return None
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdecimal() and 0 < int(port) < 65536):
+        raise ViewerError(
+            f"{option}: expected a port from 1 to 65535, or HOST:PORT, found {printable(text, 60)}"
+        )
+    return host or "127.0.0.1", int(port)
 
 
 def _show_first_scene(server: Server, live: Live) -> int:

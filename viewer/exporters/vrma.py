@@ -23,7 +23,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.gltf.document import Document, text_of
 from viewer.exporters.gltf.keyed import AnimationParts
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.exporters.vrm.humanoid import bone_above, human_bones
+from viewer.exporters.vrm.humanoid import human_bones, parent_bone
 from viewer.exporters.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
@@ -110,7 +110,7 @@ def _fill(
 ) -> dict[str, Json]:
     """Add nodes, keys and the extension; return the expressions."""
     figure = animation.figure
-    above = {bone: _parent(bone, bones) for bone in bones}
+    above = {bone: parent_bone(bone, bones) for bone in bones}
     order = sorted(bones, key=lambda bone: _depth(bone, above))
     # The bones are those of a T-pose in VRM's axes, on the ground.
     still, _ = in_t_pose(standing(figure, figure_pose(figure), bones), bones)
@@ -148,18 +148,6 @@ def _fill(
     document.root["extensions"] = {_EXTENSION: extension}
     document.declare(_EXTENSION)
     return weights
-
-
-def _parent(bone: str, bones: dict[str, int]) -> str:
-    """Return the nearest exported ancestor of a bone; empty for the hips."""
-    above = bone_above(bone)
-    if bone in ("neck", "head") or bone.endswith(("Shoulder", "UpperArm")):
-        spine = ("upperChest", "chest", "spine")
-        chain = {"head": ("neck", *spine)}.get(bone, spine)
-        if bone.endswith("UpperArm"):
-            chain = (bone.replace("UpperArm", "Shoulder"), *spine)
-        above = next(each for each in chain if each in bones)
-    return above
 
 
 def _depth(bone: str, above: dict[str, str]) -> int:

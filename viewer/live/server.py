@@ -124,20 +124,22 @@ class Server:
         self._requests: queue.Queue[Request] = queue.Queue(_MOST_WAITING)
         self._token = secrets.token_urlsafe(32)
         self._clients: set[socket.socket] = set()
-        self._is_over = False
+        self._is_over = self._has_file = False
         self._socket = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._socket.getsockname()[1])
 
     def start(self) -> None:
         """Write the file that lets programs in, and listen in threads."""
         write_file(self.path, self.port, self._token)
+        self._has_file = True
         threading.Thread(target=self._accept, name="live", daemon=True).start()
 
     def close(self) -> None:
         """Stop listening, remove the file, and end all connections."""
         self._is_over = True
-        with contextlib.suppress(OSError):
-            self.path.unlink()
+        if self._has_file:
+            with contextlib.suppress(OSError):
+                self.path.unlink()
         # Closing alone would not end a call of ``accept`` in another thread.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from viewer.diagnostics import note
 from viewer.errors import RigError
@@ -22,6 +22,12 @@ _ABOVE = {
     "ThumbDistal": "ThumbProximal",
 }
 """Required ancestor of each listed bone."""
+_ALL_ABOVE = {
+    **{"neck": "upperChest", "head": "neck"},
+    **{f"{side}Shoulder": "upperChest" for side in ("left", "right")},
+    **{f"{side}UpperArm": f"{side}Shoulder" for side in ("left", "right")},
+}
+"""Ancestors of bones in a complete skeleton, where optional bones are between required ones."""
 _FINGERS = ("Index", "Middle", "Ring", "Little")
 _PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
 
@@ -76,6 +82,15 @@ def bone_above(bone: str) -> str:
             return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
     found = _ABOVE.get(name, "")
     return f"{side}{found}" if found[:1].isupper() else found
+
+
+def parent_bone(bone: str, bones: Container[str]) -> str:
+    """Return the nearest ancestor of a bone among some bones; empty if there is none."""
+    above = bone
+    while above := _ALL_ABOVE.get(above) or bone_above(above):
+        if above in bones:
+            return above
+    return ""
 
 
 def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:
