@@ -1,5 +1,6 @@
 """Skeletons found in shapes made of tubes, whose joints are known."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,7 +94,9 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
         for tip, points in enumerate([*shapes, [(0, 0.5, 0), (0.01, 0.6, 0), (0.01, 1.0, 0)]])
     )
     row = np.zeros(1, dtype=np.int32)
-    tree = Tree(np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3)
+    tree = Tree(
+        np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3, np.zeros((0, 3))
+    )
     plane = _Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
     assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
 
@@ -162,18 +165,23 @@ def test_arm_on_a_base_has_its_root_there_and_joints_at_its_bends():
 
 def box(low, high):
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, 8).T
-    return corners, ConvexHull(corners).simplices
+    hull = ConvexHull(corners)
+    a, b, c = np.moveaxis(corners[hull.simplices], 1, 0)
+    outward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) > 0.0
+    faces = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
+    return corners, faces
 
 
 def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long():
     seat, back = box((-1, 1, -1), (1, 1.2, 1)), box((-1, 1, -1), (1, 2.6, -0.8))
     feet = [(x, 0.0, z) for x in (-0.9, 0.9) for z in (-0.9, 0.9)]
     legs = [box((x - 0.1, y, z - 0.1), (x + 0.1, 1.1, z + 0.1)) for x, y, z in feet]
-    joints = joints_of(found(united(seat, back, *legs)).figure.skeleton)
-    ends = [place for name, place in joints.items() if name.endswith("_end")]
+    chair = found(united(seat, back, *legs))
+    joints = joints_of(chair.figure.skeleton)
     for foot in feet:
-        assert min(np.linalg.norm(end - foot) for end in ends) < 0.3
-    assert len(ends) == 4 and joints["root"][1] > 1.0
+        assert min(np.linalg.norm(place - foot) for place in joints.values()) < 0.35
+    assert joints["root"][1] > 1.0
+    assert not [line for line in chair.lines if "loop" in str(line)]
 
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
@@ -192,11 +200,43 @@ def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):
     assert line.severity == "warning" and "no limbs found" in str(line)
 
 
-def test_ring_is_reported_as_far_from_the_skeleton():
+def test_ring_is_cut_and_has_joints_on_both_sides():
     angles = np.linspace(0.0, 2 * np.pi, 25)
     ring = pipe(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), 0.1)
-    (loop,) = [line for line in found(ring).lines if line.code == "R016"]
-    assert loop.severity == "warning"
+    result = found(ring)
+    (cut,) = [line for line in result.lines if line.code == "R016"]
+    assert cut.severity == "warning" and "a loop is cut at " in str(cut)
+    places = np.array([*joints_of(result.figure.skeleton).values()])
+    assert_allclose(np.hypot(places[:, 0], places[:, 1]), 1.0, atol=0.1)
+    # Bones all around: no gap of more than an eighth.
+    around = np.sort(np.arctan2(places[:, 1], places[:, 0]))
+    assert np.diff([*around, around[0] + 2 * np.pi]).max() < np.pi / 4
+
+
+def test_loop_is_cut_where_a_limb_only_touches_the_trunk():
+    trunk = pipe([(0, 0, 0), (0, 2.4, 0)], 0.25, around=16)
+    # An arm from the shoulder, whose pointed hand is at the hip.
+    arm = pipe([(0, 1.9, 0), (0.9, 1.9, 0), (0.9, 0.6, 0), (0.34, 0.6, 0)], 0.08)
+    result = found(united(trunk, arm))
+    (cut,) = [line for line in result.lines if line.code == "R016"]
+    place = [float(value) for value in re.findall(r"-?[\d.]+", str(cut).partition(":")[0])]
+    assert np.linalg.norm(np.subtract(place, [0.26, 0.6, 0.0])) < 0.1
+    joints = joints_of(result.figure.skeleton)
+    hand = min(joints, key=lambda name: np.linalg.norm(joints[name] - [0.34, 0.6, 0.0]))
+    assert np.linalg.norm(joints[hand] - [0.34, 0.6, 0.0]) < 0.15
+    above = [hand]
+    while above[-1] != "root":
+        above.append(parent_of(result.figure.skeleton, above[-1]))
+    assert min(np.linalg.norm(joints[name] - [0.9, 1.9, 0.0]) for name in above) < 0.2
+
+
+def test_small_holes_are_no_loops():
+    # A plate with a hole whose rim is wider than the hole.
+    plates = [
+        box((-1.5, -0.2, -1), (1.5, 0.2, -0.2)), box((-1.5, -0.2, 0.2), (1.5, 0.2, 1)),
+        box((-1.5, -0.2, -0.3), (-0.2, 0.2, 0.3)), box((0.2, -0.2, -0.3), (1.5, 0.2, 0.3)),
+    ]  # fmt: skip
+    assert not [line for line in found(united(*plates)).lines if "loop" in str(line)]
 
 
 def test_sheets_and_several_objects_are_refused():

@@ -7,6 +7,8 @@ then from there. The trunk is where most limbs meet, so that no branch has most 
 foot of what stands on one limb, such as a plant or a robot's arm; or the thicker end of what has no
 branches.
 
+- Loops are cut, as a skeleton has none: where they are narrow, as a hand that touches the hip, or
+  farthest from the trunk.
 - Branches closer to each other than the solid's radius there are one joint: a *hub*.
 - A limb begins where its level set parts from those of the others: at the surface of the trunk.
 - Joints are where the path bends (Douglas and Peucker 1973) if it bends sharply a few times, as a
@@ -19,6 +21,7 @@ branches.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -35,7 +38,7 @@ from viewer.autorig.solid import Solid, solid_within
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
-from viewer.phrases import counted
+from viewer.phrases import counted, listed, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -45,8 +48,9 @@ from viewer.rigs.skeleton import ball_skeleton
 _FINEST = 160  # voxels along the longest side of thin meshes: legs of spiders
 _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of the vertices there
 # Distance from the skeleton, relative to its half width and to the largest radius of the solid, and
-# fraction of the solid there for which loops and sheets are reported.
+# fraction of the solid there for which sheets are reported.
 _FAR, _MISSED = 2.0, 0.1
+_MOST_LOOPS = 20  # loops that are cut: each takes a search
 _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
 
 # Limbs.
@@ -127,6 +131,8 @@ class Tree:
     """Sorted by the hubs where they begin."""
     routes: tuple[Ints, ...]
     """Voxels of the path from the place to each tip."""
+    cuts: Floats
+    """(C, 3). Places where loops were cut."""
 
 
 def at_lengths(points: Floats, lengths: Floats) -> Floats:
@@ -143,12 +149,23 @@ class _Field:
 
         self.solid, self.radii = solid, paths.radii
         self.centers = solid.centers(solid.voxels)
-        self.distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
-        self._levels = LevelSets(paths.steps, self.distances, solid.spacing)
-        self._widths = self._levels.half_widths(self.centers)
-        self._middles = self._levels.middles(self.centers)
         size = solid.spacing * max(solid.inside.shape)
         self._least = max(_SHORTEST * size, _VOXELS * solid.spacing)
+        self.cuts = np.zeros((0, 3))
+        """(C, 3). Places where loops were cut."""
+        while True:
+            self.distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
+            self._levels = LevelSets(paths.steps, self.distances, solid.spacing)
+            self._widths = self._levels.half_widths(self.centers)
+            loop = self._levels.loop(self._widths, self._least)
+            if loop is None or len(self.cuts) == _MOST_LOOPS:
+                break
+            above, below = (np.isin(self._levels.labels, part) for part in loop)
+            ends = paths.cut(above, below)
+            if ends is None:
+                break
+            self.cuts = np.concatenate([self.cuts, self.centers[ends].mean(axis=0)[None]])
+        self._middles = self._levels.middles(self.centers)
         self.tips = self._levels.tips(self._is_limb)
         routes = paths.to(np.array([source]), self.tips.rows)
         self.routes = {k: route[::-1] for k, route in enumerate(routes) if self._stands(k, route)}
@@ -219,7 +236,8 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
             chains.append(Chain(start, end, points, width, begin, beyond))
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
-    return Tree(places, paths.radii[rows], rows, ordered, tuple(field.routes.values()))
+    routes = tuple(field.routes.values())
+    return Tree(places, paths.radii[rows], rows, ordered, routes, field.cuts)
 
 
 def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner: bool) -> int:
@@ -306,7 +324,11 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     tree = tree_of(solid, paths, source)
     report_fraction(0.4)
     root = source if len(tree.chains) == 0 else _trunk(solid, paths, tree, centers @ up)
-    return tree if root == source else tree_of(solid, paths, root)
+    if root == source:
+        return tree
+    # Loops stay cut.
+    again = tree_of(solid, paths, root)
+    return replace(again, cuts=np.concatenate([tree.cuts, again.cuts]))
 
 
 def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
@@ -598,10 +620,16 @@ def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
         limbs=limbs,
         pairs=counted(found.pairs, "pair"),
     )
+    for place in found.cuts:
+        yield note(
+            "R016.loop-cut: a loop is cut at {place}: bones cannot form one, so both sides move "
+            "apart there",
+            place=listed([rounded(value) for value in place.tolist()]),
+        )
     if found.missed > _MISSED:
         yield note(
-            "R016.loops: {missed:.0%} of the mesh is far from the skeleton: loops and wide sheets "
-            "have no joints of their own",
+            "R016.loops: {missed:.0%} of the mesh is far from the skeleton: wide sheets have no "
+            "joints of their own",
             missed=found.missed,
         )
     if found.pairs and is_assumed:
@@ -627,6 +655,8 @@ class Joints:
     """Number of pairs of them that mirror each other."""
     missed: float
     """Fraction of the solid that is far from the skeleton."""
+    cuts: Floats
+    """(C, 3). Places where loops were cut."""
 
 
 def joints_in(
@@ -668,11 +698,12 @@ def joints_in(
         labels.limbs,
         labels.pairs,
         _missed(solid, tree),
+        tree.cuts,
     )
 
 
 def _missed(solid: Solid, tree: Tree) -> float:
-    """Return the fraction of a solid that is far from all chains, such as one side of a ring."""
+    """Return the fraction of a solid that is far from all chains, as a wide sheet is."""
     from scipy import spatial
 
     if len(tree.chains) == 0:

@@ -18,6 +18,10 @@ _BAND = 1.5  # thickness of a level set of the geodesic distance, in voxels
 # Exponent of the radius in the cost of a path. Above 1, a detour through the middle of a wide part
 # is worth its length.
 _MEDIAL = 1.5
+# A loop: its height, half of its length, relative to the half width of its sides. That around a
+# small hole is none. It is cut where it is narrow: relative to the median of its sides.
+_LOOP, _NARROW = 2.0, 0.5
+_SPAN = 2  # bands that a step to a neighbour crosses at most: it is up to 1.2 bands long
 
 
 class Paths:
@@ -29,6 +33,19 @@ class Paths:
         # Close to the surface, the radius is known to half a voxel only.
         wide = np.maximum(self.radii / solid.spacing, 0.5)
         self._graph: csr_array = solid.graph(wide**-_MEDIAL)
+
+    def cut(self, first: Bools, second: Bools) -> Ints | None:
+        """Remove the steps between two sets of voxels (N,) each, and return where they began.
+
+        None, and nothing is removed, if the solid would fall apart.
+        """
+        from scipy.sparse import csgraph
+
+        steps, starts = _cut(self.steps, first, second)
+        if csgraph.connected_components(steps, directed=False, return_labels=False) > 1:
+            return None
+        self.steps, self._graph = steps, _cut(self._graph, first, second)[0]
+        return starts
 
     def to(self, ends: Ints, starts: Ints) -> list[Ints]:
         """Return the path from each start to the nearest of the ends, as rows of the solid."""
@@ -44,6 +61,16 @@ class Paths:
                 rows.append(int(before[rows[-1]]))
             found.append(np.array(rows, dtype=np.int32))
         return found
+
+
+def _cut(graph: csr_array, first: Bools, second: Bools) -> tuple[csr_array, Ints]:
+    from scipy.sparse import coo_array, csr_array
+
+    links = graph.tocoo()
+    crosses = (first[links.row] & second[links.col]) | (second[links.row] & first[links.col])
+    kept = links.data[~crosses], (links.row[~crosses], links.col[~crosses])
+    starts: Ints = links.row[crosses]
+    return csr_array(coo_array(kept, graph.shape)), starts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,8 +121,11 @@ class LevelSets:
         below = bands[links.row] > bands[links.col]
         pairs = np.stack([self.labels[links.row[below]], self.labels[links.col[below]]], 1)
         self._above: list[list[int]] = [[] for _ in range(self.count)]
-        for high, low in np.unique(pairs, axis=0).tolist():
+        self._below: list[list[tuple[int, int]]] = [[] for _ in range(self.count)]
+        links_of, counts = np.unique(pairs, axis=0, return_counts=True)
+        for (high, low), count in zip(links_of.tolist(), counts.tolist(), strict=True):
             self._above[low].append(high)
+            self._below[high].append((count, low))
 
     def tips(self, stays: Callable[[Protrusion], bool]) -> Tips:
         """Return the prominent maxima of the distance.
@@ -157,6 +187,76 @@ class LevelSets:
             np.array([tip in necks for tip in found], dtype=np.bool_),
             tuple((at, those) for at, those in met if len(those) > 1),
         )
+
+    def loop(self, widths: Floats, least: float) -> tuple[Ints, Ints] | None:
+        """Return the level sets on both sides of a cut through a loop; None without a loop.
+
+        ``widths``: half widths of all level sets; ``least``: smallest one that counts.
+        """
+        # The tree of level sets, each below the one with the largest contact in the next band. A
+        # link to one that is not above it closes a loop, down to where both have met.
+        before = np.full(self.count, -1)
+        contact = np.zeros(self.count)
+        for node, below in enumerate(self._below):
+            if below:
+                near = max(self._band[low] for _, low in below)
+                contact[node], before[node] = max(
+                    link for link in below if self._band[link[1]] == near
+                )
+        for high in np.argsort(-self._band, kind="stable").tolist():
+            for _, low in self._below[high]:
+                sides = self._sides(high, low, before)
+                if sides is None:
+                    continue
+                around = [*sides[0], *sides[1]]
+                height = self._thickness * float(self._band[high] - self._band[around].min())
+                if height <= _LOOP * max(float(np.median(widths[around])), least):
+                    continue
+                if self._are_joined(*sides):
+                    continue
+                narrow = min(around, key=lambda node: contact[node])
+                if contact[narrow] < _NARROW * float(np.median(contact[around])):
+                    return self._cut(narrow, int(before[narrow]))
+                return self._cut(high, low)
+        return None
+
+    def _sides(self, high: int, low: int, before: Ints) -> tuple[list[int], list[int]] | None:
+        """Return both sides of a loop down to where they part; None if one is above the other."""
+        sides: tuple[list[int], list[int]] = ([], [])
+        ends = [high, low]
+        while ends[0] != ends[1]:
+            side = 0 if self._band[ends[0]] >= self._band[ends[1]] else 1
+            sides[side].append(ends[side])
+            ends[side] = int(before[ends[side]])
+        return sides if sides[1] else None
+
+    def _are_joined(self, first: list[int], second: list[int]) -> bool:
+        """Return whether both sides of a loop touch between its ends, so that it has no hole."""
+        # Voxels at the border of a plate may be level sets of their own beside the large ones.
+        other = {int(self._band[node]): node for node in first}
+        bands = self._band[second]
+        for node, band in zip(second, bands.tolist(), strict=True):
+            if bands.min() + _SPAN < band < bands.max() - _SPAN and band in other:
+                near = self._joined(node, band - _SPAN, band + _SPAN)
+                if other[band] in near:
+                    return True
+        return False
+
+    def _cut(self, high: int, low: int) -> tuple[Ints, Ints]:
+        """Return the level sets near a link, above and below it."""
+        top = int(self._band[low])
+        return self._joined(high, top + 1, top + _SPAN), self._joined(low, top + 1 - _SPAN, top)
+
+    def _joined(self, start: int, first: int, last: int) -> Ints:
+        """Return the level sets joined with one within some bands."""
+        found, todo = {start}, [start]
+        while todo:
+            node = todo.pop()
+            for other in (*self._above[node], *(low for _, low in self._below[node])):
+                if other not in found and first <= self._band[other] <= last:
+                    found.add(other)
+                    todo.append(other)
+        return np.array(sorted(found))
 
     def middles(self, centers: Floats) -> Floats:
         """Return the mean of each level set's voxels, from all centres (N, 3)."""
