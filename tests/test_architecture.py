@@ -375,7 +375,7 @@ def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is():
     wrong = [
         f"{path}:{node.lineno}: {ast.unparse(node)}"
         for path in SOURCES
-        for node in ast.walk(parsed(path))
+        for node in statements(parsed(path))
         if isinstance(node, ast.Assert) and not narrows(node.test)
     ]
     assert not wrong
@@ -386,7 +386,7 @@ def test_broad_handlers_raise_again_or_hand_the_problem_on():
     wrong = []
     for path in SOURCES:
         lines = path.read_text(encoding="utf-8").splitlines()
-        for node in ast.walk(parsed(path)):
+        for node in statements(parsed(path)):
             if not isinstance(node, ast.ExceptHandler):
                 continue
             if node.type is not None and ast.unparse(node.type) not in WIDE:

@@ -28,19 +28,25 @@ SHARED = {name: text for name, text in vars(wording).items() if name.isupper()}
 
 
 @cache
-def trees() -> dict[str, ast.Module]:
-    paths = sorted(ROOT.rglob("*.py"))
-    return {str(path.relative_to(ROOT)): parsed(path) for path in paths}
+def texts_and_calls() -> tuple[list[tuple[str, str]], list[tuple[str, ast.Call]]]:
+    """Return all strings, and all calls with arguments, with their places: one walk for all."""
+    texts, calls = list[tuple[str, str]](), list[tuple[str, ast.Call]]()
+    for path in sorted(ROOT.rglob("*.py")):
+        name = path.relative_to(ROOT)
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.append((f"{name}:{node.lineno}", node.value))
+            elif isinstance(node, ast.Call) and node.args:
+                calls.append((f"{name}:{node.lineno}", node))
+    return texts, calls
 
 
 def sentences() -> Iterator[tuple[str, str, str]]:
     """Yield the place, key and sentence of every message."""
-    for path, tree in trees().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                found = KEY.fullmatch(node.value)
-                if found:
-                    yield f"{path}:{node.lineno}", found[1], found[2]
+    for place, text in texts_and_calls()[0]:
+        found = KEY.fullmatch(text)
+        if found:
+            yield place, found[1], found[2]
 
 
 def names_in(sentence: str) -> set[str]:
@@ -59,10 +65,8 @@ def test_every_message_has_a_known_code():
 def test_every_call_has_a_sentence():
     bare = re.compile(r"[A-Z]\d{3}\.[a-z0-9-]+")
     wrong = [
-        f"{path}:{call.lineno}"
-        for path, tree in trees().items()
-        for call in ast.walk(tree)
-        if isinstance(call, ast.Call) and call.args
+        place
+        for place, call in texts_and_calls()[1]
         for text in [getattr(call.args[0], "value", None)]
         if isinstance(text, str) and bare.fullmatch(text)
     ]
@@ -71,21 +75,18 @@ def test_every_call_has_a_sentence():
 
 def test_every_call_supplies_the_values_of_its_sentence():
     wrong, n_checked = [], 0
-    for path, tree in trees().items():
-        for call in ast.walk(tree):
-            if not isinstance(call, ast.Call) or not call.args:
-                continue
-            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
-            text = next(filter(None, map(_text_of, call.args[:2])), None)
-            if text is None or name not in (CALLS if KEY.match(text) else PHRASES):
-                continue
-            given = _names_of(call)
-            if given is None:
-                continue  # the values are forwarded
-            n_checked += 1
-            wanted = names_in(text.partition(": ")[2] if KEY.match(text) else text)
-            if not wanted <= given:
-                wrong.append(f"{path}:{call.lineno}: misses {sorted(wanted - given)}")
+    for place, call in texts_and_calls()[1]:
+        name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+        text = next(filter(None, map(_text_of, call.args[:2])), None)
+        if text is None or name not in (CALLS if KEY.match(text) else PHRASES):
+            continue
+        given = _names_of(call)
+        if given is None:
+            continue  # the values are forwarded
+        n_checked += 1
+        wanted = names_in(text.partition(": ")[2] if KEY.match(text) else text)
+        if not wanted <= given:
+            wrong.append(f"{place}: misses {sorted(wanted - given)}")
     assert wrong == [] and n_checked > 800
 
 
