@@ -25,7 +25,13 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES, Source
-from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
+from viewer.formats._archive.zip import (
+    DAMAGE,
+    StoredFile,
+    check_members,
+    check_names,
+    check_ratio,
+)
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import counted, listed, printable
 
@@ -45,7 +51,6 @@ MOST_BYTES = 2 << 30
 MOST_FILES = 5_000
 """Maximum number of files unpacked from one archive."""
 
-_ENCRYPTED = 0x41  # bits 0 and 6 of the flags
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 _DAMAGE = (*DAMAGE, NotImplementedError)
 _QUOTED = re.compile(r"""'.*'|".*\"""", re.DOTALL)  # names in messages
@@ -356,56 +361,36 @@ class _Archive:
         except _DAMAGE as problem:
             if _is_full(problem):
                 raise
-            raise self._fault(wording.SUBMISSION_ZIP, reason=_reason(problem)) from None
+            raise self.fault(wording.SUBMISSION_ZIP, reason=_reason(problem)) from None
         return sum(member.file_size for member in members.values())
 
     def _check(self, members: dict[str, zipfile.ZipInfo]) -> None:
+        check_members(members.items(), self.fault)
         for name, member in members.items():
-            item = printable(name, 80)
-            if member.flag_bits & _ENCRYPTED:
-                raise self._fault(
-                    "F002.submission-encrypted: {item}: expected an unencrypted file, found an "
-                    "encrypted one",
-                    item=item,
-                )
             if stat.S_ISLNK(member.external_attr >> 16):
-                raise self._fault(
+                raise self.fault(
                     "F002.submission-link: {item}: expected a file, found a symbolic link",
-                    item=item,
-                )
-            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                method = member.compress_type
-                raise self._fault(
-                    "F002.submission-method: {item}: expected a stored or deflated file, found "
-                    "compression method {method}",
-                    item=item,
-                    method=method,
+                    item=printable(name, 80),
                 )
         # zipfile never returns more bytes of a member than the central directory states.
         total = sum(member.file_size for member in members.values())
         if len(members) > MOST_FILES:
-            raise self._fault(
+            raise self.fault(
                 "F001.submission-count: expected at most {most}, found {found}",
                 most=counted(MOST_FILES, "file"),
                 found=len(members),
             )
         if total > MOST_BYTES:
-            raise self._fault(
+            raise self.fault(
                 "F001.submission-size: expected at most {most:,.0f} bytes of files, found "
                 "{found:,.0f}",
                 most=MOST_BYTES,
                 found=total,
             )
-        if total > max(SMALL, MAX_RATIO * self.size):
-            raise self._fault(
-                "F002.submission-ratio: expected a compression ratio of at most {most}, found "
-                "{found} bytes in {size}",
-                most=MAX_RATIO,
-                found=total,
-                size=self.size,
-            )
+        check_ratio(total, self.size, self.fault)
 
-    def _fault(self, key: str, **values: Any) -> FormatError:
+    def fault(self, key: str, **values: Any) -> FormatError:
+        """Return the error about this archive, with the values of its sentence."""
         return FormatError.fault(key, self.shown, **values)
 
 
@@ -418,16 +403,9 @@ def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> It
             infos = [info for info in archive.infolist() if not info.is_dir()]
             pairs = [(_path_of(info, shown), info) for info in infos]
             pairs = [(name, info) for name, info in pairs if not is_junk(name)]
-            for name, count in Counter(name for name, _ in pairs).items():
-                if count > 1:
-                    raise FormatError.fault(
-                        "F002.submission-twice: {item}: expected a single file with this "
-                        "path, found {found}",
-                        shown,
-                        item=printable(name, 80),
-                        found=count,
-                    )
-            yield _Archive(shown, storage.size, archive, dict(pairs))
+            opened = _Archive(shown, storage.size, archive, dict(pairs))
+            check_names([name for name, _ in pairs], opened.fault)
+            yield opened
     except _DAMAGE as problem:
         if _is_full(problem):
             raise

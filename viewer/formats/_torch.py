@@ -15,7 +15,7 @@ from typing import Literal
 
 from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive
-from viewer.formats._archive.zip import StoredFile, ZipDirectory, opened_member
+from viewer.formats._archive.zip import StoredFile, ZipDirectory, opened_member, read_into
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
@@ -25,7 +25,6 @@ from viewer.phrases import counted, quoted
 
 _PICKLE = "/data.pkl"
 _LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays
-_LARGEST_READ = 1 << 20
 
 
 def is_torch(directory: ZipDirectory) -> bool:
@@ -92,16 +91,12 @@ class _Storages:
 
 
 def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
-    """Read the bytes of a member in pieces: reading it as a whole needs twice the memory."""
-    room, done = bytearray(member.file_size), 0
+    room = memoryview(bytearray(member.file_size))
     with opened_member(storage, member, member.filename) as stream:
-        while done < len(room):
-            piece = stream.read(min(_LARGEST_READ, len(room) - done))
-            if not piece:
-                raise EOFError(f"{done} bytes")
-            room[done : done + len(piece)] = piece
-            done += len(piece)
-    return memoryview(room).toreadonly()
+        found = read_into(stream, room)
+        if found < len(room):
+            raise EOFError(f"{found} bytes")
+    return room.toreadonly()
 
 
 # Legacy streams of torch: files before version 1.6, and storages inside other pickles.

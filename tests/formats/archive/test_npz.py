@@ -282,7 +282,7 @@ def test_bomb_is_refused_before_it_is_unpacked():
             member.write(bytes(1 << 20))
     data = stream.getvalue()
     assert len(data) < 1 << 19
-    line = ("F002.npz-ratio", None, {"most": 100, "found": size, "size": len(data)})
+    line = ("F002.zip-ratio", None, {"most": 100, "found": size, "size": len(data)})
     assert refusal(data) == line
     assert cost(lambda: refusal(data)) < 4 << 20
 
@@ -307,7 +307,7 @@ def test_many_directory_entries_for_one_member_are_refused():
     entries = b"".join(entry.replace(b"v.npy", b"%c.npy" % (65 + n)) for n in range(26))
     tail = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 26, 26, len(entries), start, 0)
     key, _, values = refusal(data[:start] + entries + tail)
-    assert (key, values["most"]) == ("F002.npz-ratio", 100)
+    assert (key, values["most"]) == ("F002.zip-ratio", 100)
     assert str(values["found"]).startswith("218107")
 
 
@@ -327,7 +327,7 @@ def changed(data: bytes, local: int, central: int, value: int) -> bytes:
 
 
 def test_encrypted_member_is_refused():
-    line = ("F002.npz-encrypted", None, {"item": "v"})
+    line = ("F002.zip-encrypted", None, {"item": "v"})
     assert refusal(changed(npz(v=ROWS), 6, 8, 1)) == line
     assert refusal(changed(npz(v=ROWS), 6, 8, 0x41)) == line
 
@@ -335,10 +335,10 @@ def test_encrypted_member_is_refused():
 @pytest.mark.parametrize(
     ("method", "found"),
     [
-        (12, ("F002.npz-method-name", None, {"item": "v", "method": "bzip2"})),
-        (14, ("F002.npz-method-name", None, {"item": "v", "method": "LZMA"})),
-        (93, ("F002.npz-method-name", None, {"item": "v", "method": "Zstandard"})),
-        (99, ("F002.npz-method", None, {"item": "v", "method": 99})),
+        (12, ("F002.zip-method", None, {"item": "v", "method": "bzip2"})),
+        (14, ("F002.zip-method", None, {"item": "v", "method": "LZMA"})),
+        (93, ("F002.zip-method", None, {"item": "v", "method": "Zstandard"})),
+        (99, ("F002.zip-method", None, {"item": "v", "method": "compression method 99"})),
     ],
 )
 def test_unsupported_compression_is_refused(method, found):
@@ -351,10 +351,10 @@ def test_duplicate_name_is_refused():
     with zipfile.ZipFile(stream, "w") as archive:
         for _ in "ab":
             archive.writestr("v.npy", npy(header(), bytes(8)))
-    assert refusal(stream.getvalue()) == ("F002.npz-twice", None, {"item": "v", "found": 2})
+    assert refusal(stream.getvalue()) == ("F002.zip-twice", None, {"item": "v", "found": 2})
     one = npy(header(), bytes(8))
     assert refusal(zipped({"v.npy": one, "v": one})) == (
-        "F002.npz-twice",
+        "F002.zip-twice",
         None,
         {"item": "v", "found": 2},
     )

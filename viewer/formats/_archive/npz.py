@@ -28,13 +28,13 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
 from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
-from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory, opened_member
+from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory, opened_member, read_into
 from viewer.formats._source import InvalidValueError, Source, too_large
 from viewer.phrases import axes
 from viewer.rigs.arrays import Deferred
 
 _MAX_AXES = 32
-_CHUNK = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying
+_CHUNK = 1 << 16  # bytes of a pickle read at a time
 _LONGEST_HEADER = 1 << 16
 _LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # format of the header's length, by version
 _RECORD = re.compile(rb"'descr'\s*:\s*[\[(]")
@@ -244,13 +244,7 @@ def _load(storage: StoredFile, key: str, header: _Header, opened: _Opened) -> ND
 
 
 def _fill(storage: StoredFile, key: str, flat: NDArray[np.generic], stream: IO[bytes]) -> None:
-    """Read the values of an array in chunks: as a whole they would need twice the memory."""
-    size = flat.nbytes
-    room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
-    done = 0
-    while done < size:
-        chunk = stream.read(min(_CHUNK, size - done))
-        if not chunk:
-            raise storage.fault(key, wording.NPY_CUT, expected=size, found=done)
-        room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
-        done += len(chunk)
+    """Read the values of an array."""
+    found = read_into(stream, flat.view(np.uint8).data) if flat.nbytes else 0
+    if found < flat.nbytes:
+        raise storage.fault(key, wording.NPY_CUT, expected=flat.nbytes, found=found)

@@ -9,7 +9,7 @@ import struct
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, cast, overload
@@ -39,6 +39,7 @@ SMALL = 64 << 20
 _LONGEST_DIRECTORY = 2 << 20
 """Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
 _CHUNK = 1 << 20
+_INFLATED = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying
 _PAGE = 1 << 16  # number of bytes read at a time for small values
 _PIECE = 1 << 20  # number of bytes read at a time for arrays
 _ENCRYPTED = 0x41  # flag bits 0 and 6
@@ -60,47 +61,56 @@ class ZipDirectory:
 
     def check(self, key_of: Callable[[zipfile.ZipInfo], str]) -> None:
         """Refuse repeated, encrypted, unreadable or oversized members before unpacking any."""
-        source, size = self.source, self.storage.size
-        for name, count in Counter(map(key_of, self.members)).items():
-            if count > 1:
-                raise source.fault(
-                    "F002.npz-twice: {item}: expected a single entry with this name, found {found}",
-                    item=printable(name, 60),
-                    found=count,
-                )
-        for member in self.members:
-            name, method = printable(key_of(member), 60), member.compress_type
-            if member.flag_bits & _ENCRYPTED:
-                raise source.fault(
-                    "F002.npz-encrypted: {item}: expected stored or deflated data, found "
-                    "encrypted data",
-                    item=name,
-                )
-            if method in _METHODS:
-                raise source.fault(
-                    "F002.npz-method-name: {item}: expected stored or deflated data, found "
-                    "{method}",
-                    item=name,
-                    method=_METHODS[method],
-                )
-            if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise source.fault(
-                    "F002.npz-method: {item}: expected stored or deflated data, found compression "
-                    "method {method}",
-                    item=name,
-                    method=method,
-                )
+        source, named = self.source, [(key_of(member), member) for member in self.members]
+        check_names([name for name, _ in named], source.fault)
+        check_members(named, source.fault)
         total = sum(member.file_size for member in self.members)
         if total > source.max_size:
             raise too_large(source.path, total, source.max_size)
-        if total > max(SMALL, MAX_RATIO * size):
-            raise source.fault(
-                "F002.npz-ratio: expected a compression ratio of at most {most}, found {found} "
-                "bytes in {size}",
-                most=MAX_RATIO,
-                found=total,
-                size=size,
+        check_ratio(total, self.storage.size, source.fault)
+
+
+_Fault = Callable[..., FormatError]  # returns the error about an archive, given key and values
+
+
+def check_names(names: Sequence[str], fault: _Fault) -> None:
+    """Refuse an archive with several members of one name."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise fault(
+                "F002.zip-twice: {item}: expected a single file with this path, found {found}",
+                item=printable(name, 80),
+                found=count,
             )
+
+
+def check_members(members: Iterable[tuple[str, zipfile.ZipInfo]], fault: _Fault) -> None:
+    """Refuse members, given with their names, that cannot be unpacked."""
+    for name, member in members:
+        item, method = printable(name, 80), member.compress_type
+        if member.flag_bits & _ENCRYPTED:
+            raise fault(
+                "F002.zip-encrypted: {item}: expected an unencrypted file, found an encrypted one",
+                item=item,
+            )
+        if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise fault(
+                "F002.zip-method: {item}: expected a stored or deflated file, found {method}",
+                item=item,
+                method=_METHODS.get(method) or Phrase("compression method {method}", method=method),
+            )
+
+
+def check_ratio(total: int, size: int, fault: _Fault) -> None:
+    """Refuse an archive of ``size`` bytes that unpacks to implausibly many."""
+    if total > max(SMALL, MAX_RATIO * size):
+        raise fault(
+            "F002.zip-ratio: expected a compression ratio of at most {most}, found {found} bytes "
+            "in {size}",
+            most=MAX_RATIO,
+            found=total,
+            size=size,
+        )
 
 
 @contextmanager
@@ -196,6 +206,15 @@ def opened_member(storage: StoredFile, member: zipfile.ZipInfo, key: str) -> Ite
             yield stream
     except DAMAGE as problem:
         raise storage.damaged(key, problem) from None
+
+
+def read_into(stream: IO[bytes], room: memoryview) -> int:
+    """Fill bytes from a stream, in pieces: a whole needs twice the memory; return how many."""
+    done = 0
+    while done < len(room) and (piece := stream.read(min(_INFLATED, len(room) - done))):
+        room[done : done + len(piece)] = piece
+        done += len(piece)
+    return done
 
 
 def value_fault(
