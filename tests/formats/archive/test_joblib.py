@@ -236,7 +236,7 @@ def test_decompressed_data_above_the_size_limit_are_refused(data):
 
 @pytest.mark.slow
 def test_decompression_bombs_are_refused():
-    data = zlib.compress(bomb(70 << 20), 9)
+    data = zlib.compress(bomb(70 << 20), 1)
     assert refusal(data)[0] == "F002.packed-size"
 
 
