@@ -225,7 +225,10 @@ def add_animation(
     """Add frames at times (F,) in seconds from 0 to an animation, -1 for a new one; return it."""
     # Single precision distinguishes the times of eight million frames at any rate.
     keys, at = AnimationParts(), document.array(times.astype(np.float32), "SCALAR", bounds=True)
-    rotations = np.swapaxes(_continuous(frames.rotations), 0, 1)
+    units = frames.rotations / np.linalg.norm(frames.rotations, axis=-1, keepdims=True)
+    # Some programs interpolate components, which are far apart if the signs differ.
+    align_signs(units)
+    rotations = np.swapaxes(units, 0, 1)
     for node, output in zip(tree.joints, document.arrays(rotations, "VEC4"), strict=True):
         keys.add(node, "rotation", at, output)
     moves = np.flatnonzero(moving(skeleton, frames))
@@ -247,11 +250,3 @@ def add_animation(
     for node, weights in morphs:
         keys.add(node, "weights", at, document.array(weights.ravel(), "SCALAR"))
     return keys.put(document, {"name": text_of(name)}, into)
-
-
-def _continuous(rotations: Floats) -> Floats:
-    """Return unit quaternions, each with the sign nearest to the previous one: (F, J, 4)."""
-    # Some programs interpolate components, which are far apart if the signs differ.
-    units = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
-    align_signs(units)
-    return units

@@ -18,7 +18,12 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.geometry.rotation import axis_rotations, rotation_vector_to_matrix
+from viewer.rigs.geometry.quaternion import between
+from viewer.rigs.geometry.rotation import (
+    axis_rotations,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
 
 
 class JointPosing(Protocol):
@@ -176,7 +181,7 @@ class AnatomicalPosing:
         thorax, lumbar = JOINTS.index("thorax"), JOINTS.index("lumbar_body")
         wanted[thorax] = wanted[lumbar]
         turned = np.einsum("jab,jb->ja", self.learned, known)
-        shortest = _shortest_rotations(turned, wanted)
+        shortest = quaternion_to_matrix(between(turned, wanted))
         shortest[_FIXED] = np.eye(3)
         return shortest @ self.learned
 
@@ -235,17 +240,3 @@ def _arc(angle: Floats, length: float) -> tuple[Floats, Floats]:
     half = np.sinc(0.5 * angle / np.pi)  # sin(a / 2) / (a / 2)
     aside = 0.5 * length * angle * half * half
     return aside, length * (np.sinc(angle / np.pi) - 1.0)
-
-
-def _shortest_rotations(source: Floats, target: Floats) -> Floats:
-    """Return the rotations that align vectors (J, 3); the identity for zero vectors."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        a = source / np.linalg.norm(source, axis=1, keepdims=True)
-        b = target / np.linalg.norm(target, axis=1, keepdims=True)
-    cross, cosine = np.cross(a, b), np.einsum("ja,ja->j", a, b)
-    sine = np.linalg.norm(cross, axis=1) + np.finfo(np.float64).eps
-    x, y, z = cross.T
-    zero = np.zeros_like(x)
-    matrix = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    found = np.eye(3) + matrix + matrix @ matrix * ((1.0 - cosine) / sine**2)[:, None, None]
-    return np.where(np.isnan(found), np.eye(3), found)

@@ -11,7 +11,6 @@ from viewer.errors import RigError
 from viewer.phrases import printable
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.inspection.single_vertices import check_vertices
 from viewer.rigs.kinematics import posed_skeleton
@@ -21,7 +20,7 @@ from viewer.rigs.scalars import joint_text
 from viewer.rigs.shape import rest_positions, shaped
 from viewer.rigs.skin import Skin, bind_positions, has_influence, skin_rows, strongest_first
 from viewer.rigs.skinning import METHODS, Skinning, skin_used, skinned
-from viewer.rigs.skinning.dqs import split_palette
+from viewer.rigs.skinning.dqs import moved_rigidly, split_palette
 
 _TINY = 1e-12  # sums of weights or quaternions below this define no rotation
 _LONGEST = 40  # maximum number of characters of a joint's name
@@ -173,15 +172,8 @@ def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
     if not is_moved or length <= _TINY:
         return DualTerms(fractions, duals, signs, stretches, blended, length, rest, rest)
     stretched = stretch[:, :3] @ rest + stretch[:, 3]
-    position = _moved(blended / length, stretched)
+    position = moved_rigidly((blended / length)[None], stretched[None])[0]
     return DualTerms(fractions, duals, signs, stretches, blended, length, stretched, position)
-
-
-def _moved(dual: Floats, point: Floats) -> Floats:
-    """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
-    real, other = dual[:4], dual[4:]
-    shift = real[3] * other[:3] - other[3] * real[:3] + np.cross(real[:3], other[:3])
-    return quaternion_to_matrix(real) @ point + 2.0 * shift
 
 
 class _Text:

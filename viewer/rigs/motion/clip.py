@@ -89,6 +89,14 @@ class Clip:
     """A motion of one skeleton."""
 
     kind: ClassVar[Literal["curves"]] = "curves"
+    timing: ClassVar[None] = None
+    """Curves have no frames."""
+    points: ClassVar[None] = None
+    """Joints move."""
+    sets_shape: ClassVar[bool] = False
+    """Curves move joints only."""
+    frame_rate: ClassVar[float] = DEFAULT_RATE
+    """Frames per second by which curves are counted."""
     name: str
     """Display name."""
     channels: tuple[Channel, ...]
@@ -102,24 +110,6 @@ class Clip:
         object.__setattr__(self, "end", float(self.end))
         if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
-
-    @property
-    def timing(self) -> None:
-        """None: curves have no frames."""
-
-    @property
-    def points(self) -> None:
-        """None: joints move."""
-
-    @property
-    def sets_shape(self) -> bool:
-        """False: curves move joints only."""
-        return False
-
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second by which curves are counted."""
-        return DEFAULT_RATE
 
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False

@@ -25,6 +25,8 @@ class SampledClip:
     """A motion of one skeleton as frames, as captures are stored."""
 
     kind: ClassVar[Literal["sampled"]] = "sampled"
+    points: ClassVar[None] = None
+    """Joints move."""
     name: str
     """Display name."""
     timing: Timing
@@ -82,10 +84,6 @@ class SampledClip:
     def end(self) -> float:
         """Seconds of the last frame."""
         return self.timing.end
-
-    @property
-    def points(self) -> None:
-        """None: joints move."""
 
     @property
     def sets_shape(self) -> bool:

@@ -98,6 +98,10 @@ class TransformClip:
     """A motion of one figure, as keys of joint transforms and shape weights."""
 
     kind: ClassVar[Literal["transforms"]] = "transforms"
+    timing: ClassVar[None] = None
+    """Keys have their own times."""
+    points: ClassVar[None] = None
+    """Joints move."""
     name: str
     """Display name."""
     channels: tuple[TransformChannel, ...]
@@ -116,14 +120,6 @@ class TransformClip:
         object.__setattr__(self, "end", float(self.end))
         if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
-
-    @property
-    def timing(self) -> None:
-        """None: keys have their own times."""
-
-    @property
-    def points(self) -> None:
-        """None: joints move."""
 
     @property
     def sets_shape(self) -> bool:

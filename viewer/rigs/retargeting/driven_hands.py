@@ -19,6 +19,7 @@ from viewer.phrases import Remedy
 from viewer.rigs.arrays import Floats
 from viewer.rigs.cleanup.frames import in_frame_order
 from viewer.rigs.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds, shape_of
+from viewer.rigs.feet.curves import falling
 from viewer.rigs.feet.legs import Leg, leg_rotations
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.evaluation import rest_translations_of
@@ -177,7 +178,7 @@ def _shifts(
             # A stout body keeps the hand outside: no nearer than its skin, unless it is already.
             outside = np.minimum(radii.get(start, 0.0), np.linalg.norm(own - nearest, axis=1))
             longer = np.maximum(outside / np.maximum(distance, 1e-30), 1.0)
-            weight = _falloff(distance, _NEAR, _FAR)
+            weight = falling((distance - _NEAR) / (_FAR - _NEAR))
             goal = nearest + longer[:, None] * away
             total += weight[:, None] ** 2 * (goal - own)
             weights += weight**2
@@ -187,7 +188,7 @@ def _shifts(
     # Hands that touch each other move by half of the difference each.
     ends = [body.at(arm[2]) + shift for arm, shift in zip(_ARMS, shifts, strict=True)]
     between = (other.at(_ARMS[1][2]) - other.at(_ARMS[0][2])) @ to_target.T
-    weight = _falloff(np.linalg.norm(between, axis=1), _TOGETHER, _APART)
+    weight = falling((np.linalg.norm(between, axis=1) - _TOGETHER) / (_APART - _TOGETHER))
     half = 0.5 * weight[:, None] * (between - (ends[1] - ends[0]))
     shifts = [shifts[0] - half, shifts[1] + half]
     return shifts, [np.maximum(near, weight) for near in nearness], weight
@@ -196,12 +197,6 @@ def _shifts(
 def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
     for part in _PARTS:
         yield from pairwise([name for name in part if name in joints])
-
-
-def _falloff(distance: Floats, near: float, far: float) -> Floats:
-    """Return 1 up to ``near``, 0 beyond ``far``, and a smooth step (3 x^2 - 2 x^3) between."""
-    part = np.clip((far - distance) / (far - near), 0.0, 1.0)
-    return part * part * (3.0 - 2.0 * part)
 
 
 def _beyond_slack(shift: Floats, slack: Floats) -> Floats:

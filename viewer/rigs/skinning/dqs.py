@@ -45,7 +45,7 @@ def deform(
     for chosen, blended, stretch in _blended(skin, duals, stretches):
         points = positions[chosen]
         stretched = np.einsum("vab,vb->va", stretch[:, :, :3], points) + stretch[:, :, 3]
-        moved[chosen] = _rigid(blended, stretched)
+        moved[chosen] = moved_rigidly(blended, stretched)
         stretched_normals = inverse_transposed(
             np.moveaxis(stretch[:, :, :3], 0, -1), normals[chosen]
         )
@@ -131,7 +131,7 @@ def _blend(
     return blended, stretch, is_moved
 
 
-def _rigid(duals: Floats, points: Floats) -> Floats:
+def moved_rigidly(duals: Floats, points: Floats) -> Floats:
     """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
     real, dual = duals[:, :3], duals[:, 4:7]
     w_real, w_dual = duals[:, 3:4], duals[:, 7:8]
