@@ -32,6 +32,8 @@ class _Part(NamedTuple):
     receive: Receiver
     title: str = ""
     span: tuple[float, float] | None = None
+    take: Callable[[object], None] | None = None
+    """Called with intermediate results."""
 
     def pass_on(self, done: float, total: float, unit: str, what: str) -> None:
         """Report steps of the part to the receiver, as a percentage of its whole work if known."""
@@ -55,9 +57,11 @@ def _within(part: _Part | None) -> Iterator[None]:
         _part.reset(token)
 
 
-def receiving(receive: Receiver) -> AbstractContextManager[None]:
-    """Pass progress reported in the block, in this thread, to a function."""
-    return _within(_Part(receive))
+def receiving(
+    receive: Receiver, take: Callable[[object], None] | None = None
+) -> AbstractContextManager[None]:
+    """Pass progress and intermediate results of the block, in this thread, to functions."""
+    return _within(_Part(receive, take=take))
 
 
 def receiver() -> Receiver | None:
@@ -83,7 +87,7 @@ def part_of_work(title: str = "", span: tuple[float, float] | None = None) -> It
     if span is not None:
         low, high = outer.span or (0.0, 1.0)
         span = low + (high - low) * span[0], low + (high - low) * span[1]
-    part = _Part(outer.receive, title or outer.title, span or outer.span)
+    part = _Part(outer.receive, title or outer.title, span or outer.span, outer.take)
     with _within(part):
         if title and span is not None:
             part.receive(round(100.0 * span[0]), 100, "", title)
@@ -104,6 +108,13 @@ def report_fraction(fraction: float, what: str = "") -> None:
     part = _part.get()
     if part is not None:
         part._replace(span=part.span or (0.0, 1.0)).pass_on(fraction, 1, "", what)
+
+
+def offer(found: object) -> None:
+    """Give an intermediate result, of a type of its own, to the receiver, which may show it."""
+    part = _part.get()
+    if part is not None and part.take is not None:
+        part.take(found)
 
 
 def report_bytes(done: int, total: int, what: str = "") -> None:

@@ -1,5 +1,6 @@
 """The Rig panel, operated by mouse and keys: choose, align, match, run, compare, save."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.app.core.view_frame import view_frame
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
 from viewer.app.rigging import work
@@ -21,8 +23,10 @@ from viewer.app.rigging.joint_editing import JointEditing
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import discard, trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
+from viewer.autorig.alignment.pose_fit import FittedJoints
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.confidence import Finding
+from viewer.progress import offer, report
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.motion.clip import sample
@@ -114,6 +118,39 @@ def test_template_posed_after_aligning_is_reported(rigging, texts):
     texts.clear()
     hand.step(2)
     assert "the template was posed after the alignment: align it again" in texts
+
+
+def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
+    """The first of three joints is at a vertex of the mesh, the others on a line through it."""
+    hand = rigging(placed=False)
+    corner = hand.state.scene.actors[0].figure.mesh.positions[0]
+    places = corner + np.outer([0.0, 4.0, 8.0], [0.0, 1.0, 0.0])
+    gate = threading.Event()
+
+    def fitting(*_):
+        offer(FittedJoints(places, np.array([-1, 0, 1], np.int32)))
+        while not gate.wait(0.005):
+            report(3, 10, "", "fitting limbs")
+        raise AssertionError("the job is cancelled before")
+
+    monkeypatch.setattr(work, "align_template", fitting)
+    hand.step(2)
+    before = hand.app.pixels()
+    hand.click("Align")
+    while hand.state.job.found is None:
+        hand.step()
+    hand.step(2)
+    assert hand.state.job.title == "Aligning: fitting limbs"
+    changed = (hand.app.pixels() != before).any(axis=2)
+    scale = changed.shape[1] / SIZE[0]
+    for place in places:
+        x, y = np.array(view_frame(hand.state).place(place)) * scale
+        assert changed[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].any()
+    hand.key("escape")
+    hand.finish_job()
+    x, y = np.array(view_frame(hand.state).place(places[1])) * scale
+    part = np.s_[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2]
+    assert (hand.app.pixels()[part] == before[part]).all()
 
 
 def test_match_is_coloured_before_the_target_is_rigged(rigging, texts):

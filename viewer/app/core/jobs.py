@@ -22,6 +22,8 @@ class Job:
         self._names_steps = names_steps  # whether the reported steps become the title
         self.progress = (0, 0, "")
         """Completed steps, their total (0 if unknown), and their unit."""
+        self.found: object = None
+        """The latest intermediate result."""
         self.error = ""
         """Reason why the job failed; empty if it did not."""
         self.lines: list[str] = []
@@ -57,6 +59,10 @@ class Job:
         if what and self._names_steps:
             self.title = what
 
+    def keep(self, found: object) -> None:
+        """Keep an intermediate result."""
+        self.found = found
+
 
 class ThreadJob(Job):
     """Job that acts in its own thread; ``finish`` applies its result in the frame loop."""
@@ -81,7 +87,7 @@ class ThreadJob(Job):
 
     def _run(self) -> None:
         try:
-            with receiving(self.receive):
+            with receiving(self.receive, self.keep):
                 self.lines = self._act() or []
         except Cancelled:
             pass

@@ -589,7 +589,7 @@ def refit(state: AppState) -> None:
 
         return finish
 
-    begin_work(state, "Fitting the template", act)
+    begin_work(state, "Fitting the template", act, target=actor)
 
 
 def rename_joint(state: AppState, name: str) -> None:

@@ -155,6 +155,8 @@ class Running:
     """A job in a thread, and the function that applies its result in the frame loop."""
 
     source: Scene
+    target: Actor | None = None
+    """Actor in whose mesh joints are found."""
     job: ThreadJob | None = None
     finish: Callable[[AppState], None] | None = None
 

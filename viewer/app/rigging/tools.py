@@ -17,6 +17,7 @@ from viewer.app.core.camera_moves import fit_points
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import view_frame
+from viewer.app.posing.gizmo import Pen
 from viewer.app.posing.posing import Posing
 from viewer.app.rigging.placing import (
     aligned_template,
@@ -42,6 +43,7 @@ from viewer.app.rigging.rigging import (
 )
 from viewer.app.rigging.work import finish_work, start_align, start_reading
 from viewer.app.view.hovering import Picking
+from viewer.autorig.alignment.pose_fit import FittedJoints
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.ray_hit import RayHit, first_hit, surface_point
@@ -126,6 +128,7 @@ def draw_rig_tools(state: AppState) -> None:
     """Draw the gizmo or the landmarks over the viewport, and handle drags."""
     view, template = state.of(Rigging), aligned_template(state)
     x, y, width, height = state.view_rect
+    _draw_found(state)
     if not view.tool or template is None or view.target is None or min(width, height) < 40.0:
         return
     ink = imgui.get_background_draw_list()
@@ -135,6 +138,24 @@ def draw_rig_tools(state: AppState) -> None:
     else:
         _use_gizmo(state, template)
     ink.pop_clip_rect()
+
+
+def _draw_found(state: AppState) -> None:
+    """Draw the joints of a template that is being fitted, inside the mesh."""
+    running, (x, y, width, height) = state.of(Rigging).running, state.view_rect
+    found = None if running is None or running.job is None else running.job.found
+    if running is None or running.target is None or not isinstance(found, FittedJoints):
+        return
+    pen, places = (
+        Pen(view_frame(state)),
+        apply_transform(target_place(running.target), found.places),
+    )
+    pen.list.push_clip_rect((x, y), (x + width, y + height), True)
+    for joint, parent in enumerate(found.parents.tolist()):
+        if parent >= 0:
+            pen.line(places[[parent, joint]], _TEMPLATE_INK, 2.0)
+        pen.dot(places[joint], 3.0, _TEMPLATE_INK)
+    pen.list.pop_clip_rect()
 
 
 def _show_both(state: AppState) -> None:

@@ -74,12 +74,21 @@ _CALLED: dict[TransferMethod, str] = {
 """Words that are appended to the mesh's name."""
 
 
-def begin_work(state: AppState, title: str, act: Callable[[], _Finish], output: str = "") -> None:
-    """Start a job in a thread; the frame loop later calls the function that the job returns."""
+def begin_work(
+    state: AppState,
+    title: str,
+    act: Callable[[], _Finish],
+    output: str = "",
+    target: Actor | None = None,
+) -> None:
+    """Start a job in a thread; the frame loop later calls the function that the job returns.
+
+    ``target``: in whose mesh joints are found, by default the target of the panel.
+    """
     if no_job_room(state):
         state.say_status(no_job_room(state))
         return
-    running = Running(state.scene)
+    running = Running(state.scene, target or state.of(Rigging).target)
 
     def work() -> None:
         running.finish = act()

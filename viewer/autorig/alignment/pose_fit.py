@@ -36,7 +36,7 @@ from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
-from viewer.progress import report_fraction
+from viewer.progress import offer, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import (
@@ -158,6 +158,7 @@ def fit_pose(
     for number in range(_ROUNDS):
         report_fraction(number / _ROUNDS, "fitting pose and proportions")
         aligned = _aligned_template(state, limbs)
+        offer(FittedJoints(aligned.joints, skeleton.parents))
         late = min(number / _NEARING, 1.0)
         target = far if late < 1.0 else near
         pairs = _pairs(aligned, chosen, target, target.size * reach * (_NEAR / reach) ** late)
@@ -261,6 +262,15 @@ class AlignedTemplate:
     joints: Floats
     axes: Floats
     """(J, 3). Joints of the template, and unit vectors along their limbs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedJoints:
+    """Joints of a template that is being fitted: an intermediate result."""
+
+    places: Floats
+    """(J, 3). In the target's frame."""
+    parents: Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
