@@ -70,14 +70,14 @@ def refusal(*paths, **options):
 def test_skeleton_without_a_skin_opens_as_boxes(files):
     scene = viewer.load(*files("2.skel"))
     assert parts(scene) == [("2", 2, None)]
-    assert scene.actors[0].pose is not None
+    assert scene.actors[0].own_pose is not None
     assert scene.warnings == ()
 
 
 def test_skin_without_a_skeleton_opens_in_bind_pose(files):
     scene = viewer.load(*files("2.skin"))
     assert parts(scene) == [("2", None, 2)]
-    assert scene.actors[0].pose is None
+    assert scene.actors[0].own_pose is None
 
 
 def test_path_may_be_text(files):

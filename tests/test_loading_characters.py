@@ -227,7 +227,7 @@ def test_fingers_of_smplh_drive_those_of_a_character(is_named, tmp_path):
     (actor,) = load(*paths, motion=settings).actors
     names = [name.split(":")[1] for name in actor.figure.skeleton.names]
     pose_actors([actor], 0.0)
-    places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
+    places = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
 
     def bone(start, end):
         step = places[names.index(f"LeftHand{end}")] - places[names.index(f"LeftHand{start}")]

@@ -43,10 +43,11 @@ for finding in found:
     line: int | None = finding.line
 errors: viewer.Comparison = viewer.diff(scene, hero)
 numbers: list[float] = [errors.mpjpe, errors.pa_mpjpe, errors.pve, errors.foot_skate]
-pose: viewer.Pose = person.require_pose()
+pose: viewer.Pose = person.pose
+hip: NDArray[np.float64] = pose["left_hip"]
 pose.dofs[3] = 0.5
-if person.pose is not None:
-    person.pose.figure_scale = 2.0
+person.pose["left_knee"] = [1.2, 0, 0]
+person.at(1.2).pose["left_knee"] = np.zeros(3)
 motion: viewer.MotionArrays = viewer.motion(person)
 points, normals = viewer.deform(person.figure, pose, viewer.Skinning(method="dqs"))
 options = viewer.DisplayOptions(wireframe=True, shading="pbr")

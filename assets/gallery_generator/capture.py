@@ -77,7 +77,7 @@ def _joints(body: Figure, person: Person) -> Floats:
     found = []
     for frame in range(len(walk.poses)):
         pose_actors([actor], frame / 30.0)
-        pose = actor.require_pose()
+        pose = actor.pose
         world = placement_matrix(pose) @ world_matrices(body.require_skeleton(), pose)
         found.append(world[:, :3, 3])
     return np.array(found)

@@ -66,7 +66,7 @@ def _make_capture(folder: Path, body: Figure) -> None:
 def _make_scan(folder: Path, body: Figure) -> None:
     """Write a person of another shape with lowered arms, as a mesh without a rig."""
     actor = viewer.load(bundled_body()).actors[0]
-    skeleton, pose = body.require_skeleton(), actor.require_pose()
+    skeleton, pose = body.require_skeleton(), actor.pose
     pose.shape_weights[:9] = -1.0, 1.6, 0.0, 0.6, -0.4, 0.0, 0.0, 1.2, 0.4
     for side, sign in (("left", -1.0), ("right", 1.0)):
         rows = skeleton.dof_joints == skeleton.names.index(f"{side}_shoulder")

@@ -93,7 +93,7 @@ def _draw_finding() -> Bytes:
 
 
 def _lower_arms(actor: Actor) -> None:
-    skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+    skeleton, pose = actor.figure.require_skeleton(), actor.pose
     for side, sign in (("left", -1.0), ("right", 1.0)):
         rows = np.flatnonzero(skeleton.dof_joints == skeleton.names.index(f"{side}_shoulder"))
         pose.dofs[rows[2]] = 0.9 * sign
@@ -137,7 +137,7 @@ def _draw_influences() -> Bytes:
 
 def _bend(actor: Actor) -> None:
     """Lift a knee, and bend the arms."""
-    skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+    skeleton, pose = actor.figure.require_skeleton(), actor.pose
     turns = {
         "left_hip": (-1.5, 0.0, 0.0),
         "left_knee": (1.7, 0.0, 0.0),

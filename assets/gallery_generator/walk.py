@@ -10,8 +10,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.pose import Pose, rest_pose
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, rest_pose, set_joint_rotations
 from viewer.rigs.skinning import deform
 
 __all__ = ["Gait", "Walk", "walk"]

@@ -268,7 +268,7 @@ class Driver:
         assert np.isfinite(numbers).all() and camera.distance > 0
         assert -90 <= camera.inclination <= 90
         for actor in self.state.scene.actors:
-            if actor.pose is not None:
+            if actor.own_pose is not None:
                 limits = actor.figure.skeleton.dof_limits
                 assert np.isfinite(actor.pose.dofs).all()
                 assert (limits[:, 0] <= actor.pose.dofs).all()

@@ -104,7 +104,7 @@ POSE = {
 
 
 def swap_actor(state):
-    state.scene.actors[0] = Actor(state.actor.figure, pose=state.actor.pose)
+    state.scene.actors[0] = Actor(state.actor.figure, own_pose=state.actor.pose)
 
 
 def swap_figure(state):
@@ -123,7 +123,7 @@ ACTOR = {
     "points": lambda state: add_in_place(state.actor.points),
     "no points": lambda state: setattr(state.actor, "points", None),
     "other pose": lambda state: setattr(state.actor, "pose", _turned(state.actor.pose)),
-    "no pose": lambda state: setattr(state.actor, "pose", None),
+    "no pose": lambda state: setattr(state.actor, "own_pose", None),
     "visible": lambda state: put(state.actor, "visible"),
     "present": lambda state: put(state.actor, "is_present"),
     "color": lambda state: put(state.actor, "color"),

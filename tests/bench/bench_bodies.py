@@ -42,7 +42,6 @@ def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
     actor = Actor(figure)
     scene, rng = Scene([actor]), np.random.default_rng(1)
     camera, box = default_camera(scene, SIZE), scene_box(scene)
-    assert actor.pose is not None
     dofs = actor.pose.dofs
     with Offscreen() as offscreen, offscreen.context:
         target = offscreen.target(SIZE, 1)

@@ -64,7 +64,6 @@ def cast(figure: Figure, count: int) -> Scene:
 def change(actors: list[Actor], rng: np.random.Generator) -> None:
     """Give every actor a new pose."""
     for actor in actors:
-        assert actor.pose is not None
         actor.pose.dofs[:] = rng.normal(0.0, 0.15, len(actor.pose.dofs))
 
 

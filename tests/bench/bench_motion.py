@@ -81,9 +81,7 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
     def prepare() -> None:
         pose_actors([actor], clock.next())
         figure = actor.figure
-        posed_skeleton(figure.require_skeleton(), actor.require_pose()).palette(
-            figure.require_skin()
-        )
+        posed_skeleton(figure.require_skeleton(), actor.pose).palette(figure.require_skin())
 
     return frame, prepare
 

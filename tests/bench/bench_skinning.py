@@ -86,7 +86,6 @@ def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
     actor = Actor(figure)
     scene = Scene([actor])
     camera, box = default_camera(scene, SIZE), scene_box(scene)
-    assert actor.pose is not None
     dofs = actor.pose.dofs
     rest, rng = dofs.copy(), np.random.default_rng(1)
     with Offscreen() as offscreen, offscreen.context:

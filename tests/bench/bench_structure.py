@@ -23,7 +23,7 @@ def frames(offscreen: Offscreen, scene: Scene, options: DisplayOptions) -> Calla
     rng = np.random.default_rng(0)
 
     def run() -> None:
-        pose = scene.actors[0].require_pose()
+        pose = scene.actors[0].pose
         pose.dofs[:] = rng.normal(0.0, 0.15, len(pose.dofs))
         offscreen.render(scene, SIZE, camera, options, box)
 

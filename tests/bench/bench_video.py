@@ -63,7 +63,7 @@ def moving() -> Actor:
     """Return the bundled fox with a motion that swings all joints."""
     actor = viewer.load().actors[0]
     skeleton = actor.figure.skeleton
-    assert skeleton is not None and actor.pose is not None
+    assert skeleton is not None
     end, channels = N_FRAMES / RATE, []
     for dof in np.flatnonzero(skeleton.dof_kinds >= 3):
         rest = actor.pose.dofs[dof]

@@ -21,7 +21,6 @@ def posed() -> Actor:
     raised = np.zeros((1, *POSITIONS.shape))
     raised[0, 4] = 0.0, 0.0, 4.0
     actor = seamed_actor(unit="m", blend_shapes=BlendShapes(("peak",), raised))
-    assert actor.pose is not None
     actor.pose.dofs[:] = 0.1, 0.2, 0.3, -0.4, 0.5, -0.6
     actor.pose.translations[1] = 0.0, 0.25, 0.0
     actor.pose.scales[1] = 1.0, 2.0, 3.0

@@ -100,4 +100,4 @@ def keypoints() -> tuple[Figure, PointClip]:
 
 def scene_of(figure: Figure, clip=None, pose=None) -> Scene:
     """Return a scene of one actor."""
-    return Scene([Actor(figure, pose=pose, clip=clip)])
+    return Scene([Actor(figure, own_pose=pose, clip=clip)])

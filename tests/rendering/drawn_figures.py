@@ -177,7 +177,7 @@ def arm(n_joints=4, sides=16, rings=40, material=None) -> Figure:
 def bent(figure: Figure, *turns: tuple[int, str, float]) -> Actor:
     """Return an actor with DOFs set: (joint, axis, radians)."""
     actor = Actor(figure)
-    assert figure.skeleton is not None and actor.pose is not None
+    assert figure.skeleton is not None
     for joint, axis, angle in turns:
         actor.pose.dofs[3 * joint + "xyz".index(axis)] = angle
     return actor

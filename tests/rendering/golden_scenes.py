@@ -160,7 +160,6 @@ def _many_joints() -> Scene:
     rng = np.random.default_rng(1)
     figure = random_figure(rng, 300, n_vertices=400, chain=True)
     actor = Actor(figure)
-    assert actor.pose is not None
     actor.pose.dofs[:] = rng.normal(0.0, 0.05, 900)
     return Scene([actor])
 

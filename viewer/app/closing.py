@@ -251,7 +251,7 @@ def _ask_for_keys(state: AppState, index: int = -1) -> None:
 def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
     """Return whether an actor's pose is edited, and is neither saved, reset nor set by its clip."""
     first = state.history.first_poses.get(actor)
-    if first is None or actor.pose is None:
+    if first is None or actor.own_pose is None:
         return False
     # A clip overrides an edited pose when the time changes, but not the values that it does not
     # animate, such as the shape.
@@ -266,7 +266,7 @@ def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
 
 def _fits(actor: Actor, key: PoseKey) -> bool:
     """Return whether a pose is one of the actor's joints, which may have been edited since."""
-    pose, own = pose_of(key), actor.require_pose()
+    pose, own = pose_of(key), actor.pose
     return (len(pose.dofs), len(pose.rotations)) == (len(own.dofs), len(own.rotations))
 
 
@@ -285,7 +285,9 @@ def _is_same(actor: Actor, pose: Pose) -> bool:
         release_springs(own)
         release_springs(other)
     return all(
-        np.allclose(getattr(own.pose, name), getattr(other.pose, name), rtol=_SAME, atol=_SAME)
+        np.allclose(
+            getattr(own.own_pose, name), getattr(other.own_pose, name), rtol=_SAME, atol=_SAME
+        )
         for name in _VALUES
     )
 

@@ -167,7 +167,7 @@ def _draw_actor(state: AppState, spot: Spot) -> None:
     if several and menu_item(state, "Hide others"):
         for other in state.scene.actors:
             other.visible = other is actor
-    why = "" if actor.pose is not None else "this figure has no joints to pose"
+    why = "" if actor.own_pose is not None else "this figure has no joints to pose"
     for text, key, act in (
         ("Reset pose", "", reset_actor),
         ("Mirror pose or joints", "M", mirror),

@@ -119,7 +119,7 @@ def read_back_errors(moving: MovingMesh, times: Floats, actor: Actor) -> tuple[F
     if clip is None:
         raise RigError(f"{actor.name}: expected a motion in the written file, found none")
     times = times - times[0] + clip.start
-    skinned = posed_rows(figure, clip, times, actor.pose)
+    skinned = posed_rows(figure, clip, times, actor.own_pose)
     back = np.eye(4)
     back[:3, :3] = up_rotation(figure.up, moving.figure.up)
     place = back @ actor.placement

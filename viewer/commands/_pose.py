@@ -93,9 +93,11 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
     notes = apply_time(scene, frames)
     if pose.hands:
         from viewer.rigs.hands import hand_vectors
-        from viewer.rigs.posing.pose_vector import set_joint_rotations
+        from viewer.rigs.pose import set_joint_rotations
 
-        handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
+        handed = [
+            actor for actor in scene.actors if actor.figure.hands and actor.own_pose is not None
+        ]
         if not handed:
             raise ViewerError("--hands: no file has hand components")
         for actor in handed:
@@ -103,7 +105,7 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
                 vectors = hand_vectors(hand, np.zeros(0), flat=pose.hands == "flat")
                 rotations = rotation_vector_to_matrix(vectors)
                 set_joint_rotations(
-                    actor.figure.require_skeleton(), actor.require_pose(), hand.joints, rotations
+                    actor.figure.require_skeleton(), actor.pose, hand.joints, rotations
                 )
     if pose.pose:
         record, source = _pose(pose.pose)
@@ -122,9 +124,9 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
         from viewer.rigs.retargeting.mirror import mirror_pose
 
         for actor in scene.actors:
-            if actor.pose is not None:
+            if actor.own_pose is not None:
                 try:
-                    actor.pose = mirror_pose(actor.figure, actor.pose)
+                    actor.pose = mirror_pose(actor.figure, actor.own_pose)
                 except RigError as problem:
                     raise ViewerError(f"--mirror: {problem}") from None
     return notes
@@ -173,10 +175,10 @@ def _apply_record(
 
     problem: RigError | None = None
     for actor in scene.actors:
-        if actor.pose is not None:
+        if actor.own_pose is not None:
             try:
                 return apply_record(
-                    record, actor.figure, actor.pose, drop_excess=option == "--pose"
+                    record, actor.figure, actor.own_pose, drop_excess=option == "--pose"
                 )
             except RigError as found:
                 problem = problem or found
@@ -191,16 +193,16 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
 
     if "=" in text:  # weights given by name, such as ``open=0.5,wide=1``
         actor, record = _named_record(scene, text)
-        return apply_record(record, actor.figure, actor.require_pose())
+        return apply_record(record, actor.figure, actor.pose)
     values = _numbers("--shape", text)
     assert values is not None  # the option was given
-    posed = [actor for actor in scene.actors if actor.pose is not None]
+    posed = [actor for actor in scene.actors if actor.own_pose is not None]
     morphed = [actor for actor in posed if _has_only_morphs(actor.figure)]
     others = [actor for actor in posed if actor not in morphed]
     if morphed and not any(actor.figure.n_shapes for actor in others):
         first = morphed[0]
         record = _morph_record(first.figure, values)
-        return apply_record(record, first.figure, first.require_pose())
+        return apply_record(record, first.figure, first.pose)
     figure = next((actor.figure for actor in others if actor.figure.n_shapes), None)
     if figure is not None and figure.blend_shapes is not None:
         # The option takes slider values, which need not be 0 for the mean body.
@@ -220,7 +222,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
             continue
         actor, dof, note = _find(scene, label)
         skeleton = actor.figure.require_skeleton()
-        pose = actor.require_pose()
+        pose = actor.pose
         notes += note
         is_rotation = skeleton.dof_kinds[dof] >= 3
         wanted = pose.dofs.copy()
@@ -244,15 +246,15 @@ def _place(scene: Scene, label: str, asked: str, text: str) -> bool:
     from viewer.rigs.posing.pose_record import PoseRecord, apply_record
 
     part = label[len(_FIGURE) :].lower()
-    actor = next((actor for actor in scene.actors if actor.pose is not None), None)
-    if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
+    actor = next((actor for actor in scene.actors if actor.own_pose is not None), None)
+    if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.own_pose is None:
         return False
     value = _dof_value(asked, text, False)
-    place = actor.pose.figure_translation.copy()
+    place = actor.own_pose.figure_translation.copy()
     if part != "scale":
         place["xyz".index(part[1])] = value
     record = PoseRecord(translation=place, scale=value if part == "scale" else None)
-    refused = apply_record(record, actor.figure, actor.pose)
+    refused = apply_record(record, actor.figure, actor.own_pose)
     if refused:
         raise ViewerError(f"--dof: {refused[0].values['fault']}")
     return True
@@ -319,7 +321,9 @@ def _morph_record(figure: Figure, values: Floats) -> PoseRecord:
 def _named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
     """Return the first actor that has all named shapes, and a record that keeps the others."""
     wanted = [_pair(part) for part in text.strip().removesuffix(",").split(",")]
-    shaped = [actor for actor in scene.actors if actor.pose is not None and actor.figure.n_shapes]
+    shaped = [
+        actor for actor in scene.actors if actor.own_pose is not None and actor.figure.n_shapes
+    ]
     if not shaped:
         raise ViewerError("--shape: no file has shapes or morphs")
     for actor in shaped:
@@ -335,7 +339,7 @@ def _named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
     from viewer.rigs.posing.pose_record import PoseRecord
 
-    pose = actor.require_pose()
+    pose = actor.pose
     assert actor.figure.blend_shapes is not None  # checked by the caller
     weights = np.zeros(actor.figure.n_shapes)
     weights[: len(pose.shape_weights)] = pose.shape_weights

@@ -155,7 +155,7 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
         text = length_text(scene.actors[0].figure, 0.0) if view.unit == "length" else "0"
         return f", {menu_title(split_name(name)[0], options.skinning)}: 0 to {text}"
     title = quantity_title(name, having[0].figure, options.skinning)
-    values = [compute(name, actor.figure, actor.pose, options.skinning) for actor in having]
+    values = [compute(name, actor.figure, actor.own_pose, options.skinning) for actor in having]
     if view.kind == "categorical":
         return f", {title}: {_n_different(name, scene, values)}"
     low = min(min(float(numbers.min()) for numbers in values), 0.0)

@@ -521,7 +521,7 @@ def _check_numbered(has_frames: bool, output: Path) -> None:
 
 def _asks_one_pose(frames: Frames, output: Path, scene: Scene) -> bool:
     """Return whether a single pose is written: at a frame or time, or if there is no motion."""
-    if frames.frames is not None or all(actor.pose is None for actor in scene.actors):
+    if frames.frames is not None or all(actor.own_pose is None for actor in scene.actors):
         return False
     is_still = not _moving(scene) and "{frame" not in output.name
     return is_still or frames.is_one
@@ -587,7 +587,7 @@ def _pose_or_point_actors(scene: Scene) -> list[Actor]:
 def _written_actors(frames: Frames, output: Path, scene: Scene) -> list[Actor]:
     """Return the actors whose motion is written, or whose pose is written as a one-frame motion."""
     if _asks_one_pose(frames, output, scene):
-        return _moving(scene) or [actor for actor in scene.actors if actor.pose is not None]
+        return _moving(scene) or [actor for actor in scene.actors if actor.own_pose is not None]
     moving = [actor for actor in scene.actors if actor.clip is not None]
     bodies = [actor for actor in moving if not actor.moves_points]
     if not moving:

@@ -416,7 +416,7 @@ def _moved_by(actor: Actor, clip: Clip | None) -> Actor:
     """Return an actor with a clip, or in its current pose if there is none."""
     if clip is actor.clip:
         return actor
-    return replace(actor, clip=clip, pose=figure_pose(actor.figure))
+    return replace(actor, clip=clip, own_pose=figure_pose(actor.figure))
 
 
 @dataclass(frozen=True, slots=True)
@@ -648,7 +648,7 @@ def _heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> _Heat | No
         title = f"Distance of {printable(Path(name.split('+')[0]).name or name, 40)}"
         field = VertexField("difference", title, measure.item_maxima, "length")
         figure = replace(actor.figure, fields=(field,))
-        pose = None if actor.pose is None else actor.pose.copy()
+        pose = None if actor.own_pose is None else actor.own_pose.copy()
         actors.append(Actor(figure, pose))
         most = max(most, length_unit(figure)[0] * measure.maximum)
     return _Heat(tuple(actors), most) if actors else None

@@ -392,7 +392,7 @@ def _correctives(offscreen: Offscreen, crowd: Scene) -> Iterator[Measured]:
 
     figure = crowd.actors[0].figure
     assert figure.correctives is not None  # of the bundled body
-    skeleton, poses = figure.require_skeleton(), [actor.require_pose() for actor in crowd.actors]
+    skeleton, poses = figure.require_skeleton(), [actor.pose for actor in crowd.actors]
     weights = np.stack([pose_weights(figure.correctives, skeleton, pose) for pose in poses])
     with offscreen.context:
         renderer = offscreen.renderer
@@ -438,7 +438,7 @@ def _pose(scene: Scene) -> None:
 
     now = time.perf_counter()
     for number, actor in enumerate(scene.actors):
-        pose = actor.require_pose()
+        pose = actor.pose
         pose.dofs[:] = 0.1 * np.sin(now + number + np.arange(len(pose.dofs)))
 
 
@@ -452,7 +452,7 @@ def _parts() -> Iterator[Measured]:
 
     scene = load(bundled_body())
     actor = scene.actors[0]
-    skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+    skeleton, pose = actor.figure.require_skeleton(), actor.pose
 
     def place() -> None:
         _pose(scene)

@@ -103,8 +103,8 @@ def _describe_actor(actor: Actor, up: Up) -> JsonObject:
     parts |= {"box": None if box is None else box.tolist()}
     parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
     parts["unit"] = scene_unit(Scene([actor])) or None
-    if figure.skeleton is not None and actor.pose is not None:
-        parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.pose.dofs.tolist())
+    if figure.skeleton is not None and actor.own_pose is not None:
+        parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.own_pose.dofs.tolist())
     if figure.mesh is not None:
         parts["mesh"] = _describe_mesh(figure.mesh)
     if figure.skin is not None:
@@ -346,7 +346,7 @@ def _point(values: list[float], finest: float) -> str:
 
 def _describe_model(actor: Actor, skinning: Skinning) -> JsonObject:
     """Return the properties of a shaped and posed body as JSON data; empty for a plain rig."""
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     facts = {heading: str(fact) for heading, fact in figure.facts}
     model: JsonObject = {"facts": facts} if facts else {}
     if figure.blend_shapes is not None:

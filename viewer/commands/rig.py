@@ -345,7 +345,7 @@ def _transferred(
     with shown_progress(title), part_of_work(title):
         rigged = transfer(
             template.figure,
-            template.require_pose(),
+            template.pose,
             target.require_mesh(),
             settings,
             target.name,
@@ -528,7 +528,7 @@ def _one_mesh(scene: Scene) -> Figure:
         return figure
     if figure.is_rigged:
         print_warnings([f"{printable(figure.name, 60)} already has a rig, which is ignored"])
-    mesh = posed_mesh(figure, actor.pose)
+    mesh = posed_mesh(figure, actor.own_pose)
     return Figure(figure.name, mesh, up=figure.up, unit=figure.unit)
 
 
@@ -624,11 +624,11 @@ def _has_skeleton(scene: Scene) -> bool:
 
 def _put_at_rest(actor: Actor) -> None:
     """Replace the first pose of a motion, which rarely resembles an unposed mesh, by rest."""
-    if actor.clip is None or actor.pose is None or actor.figure.skeleton is None:
+    if actor.clip is None or actor.own_pose is None or actor.figure.skeleton is None:
         return
-    shape = actor.pose.shape_weights
+    shape = actor.own_pose.shape_weights
     actor.pose = figure_pose(actor.figure)
-    actor.pose.shape_weights = shape
+    actor.own_pose.shape_weights = shape
     actor.is_present = True
 
 
@@ -647,7 +647,7 @@ def _settings(
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)
-        landmarks = read_landmarks(source, template.figure, template.require_pose())
+        landmarks = read_landmarks(source, template.figure, template.pose)
     if arguments.smooth < 0:
         raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
     # A skeleton found in the mesh is where it should be.

@@ -8,7 +8,7 @@ import viewer
 
 scene = viewer.load()  # the bundled fox; your files: viewer.load("wasp.skel", "wasp.skin")
 actor = scene.actors[0]
-skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+skeleton, pose = actor.figure.require_skeleton(), actor.pose
 
 head = skeleton.names.index("head")
 first = int((skeleton.dof_joints == head).argmax())  # its rotations about x, y and z

@@ -52,7 +52,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     if selection.part.frames is not None:
         return _export_frames(selection.part.animation, path, options)
     actor, skinning = selection.part.actor, options.skinning
-    figure, pose, mesh = actor.figure, actor.pose, actor.figure.mesh
+    figure, pose, mesh = actor.figure, actor.own_pose, actor.figure.mesh
     arrays = {
         "name": np.array(figure.name),
         "up": np.array(figure.up),

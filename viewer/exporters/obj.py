@@ -115,7 +115,7 @@ def _write(
     """Write one pose and compare the file with it; return notes about triangles and textures."""
     require_mesh(actor, ".obj")
     mesh = actor.figure.require_mesh()
-    positions, normals = deform(actor.figure, actor.pose, skinning)
+    positions, normals = deform(actor.figure, actor.own_pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
     names = _material_names(mesh)
     beside = _material_library(mesh, path, names)

@@ -29,7 +29,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     actor, skinning = selection.part.actor, options.skinning
     require_mesh(actor, ".ply")
     mesh = actor.figure.require_mesh()
-    positions, normals = deform(actor.figure, actor.pose, skinning)
+    positions, normals = deform(actor.figure, actor.own_pose, skinning)
     size = box_size(bounding_box(positions)) if mesh.n_vertices else 0.0
     kind = _number_kind(positions, size)
     uv_kind = "float" if mesh.uvs is None else _number_kind(mesh.uvs, 1.0)

@@ -29,7 +29,7 @@ _SAME = 1e-9  # difference of a number up to which it counts as stored
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a pose that ``--pose`` and the window read: all of it (``.json``) or its vector."""
     actor, skinning = selection.part.actor, options.skinning
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no skeleton and therefore no pose")
     again = figure_pose(figure)

@@ -45,7 +45,7 @@ _CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton'
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write skeleton and skin in the pose and shape, and report the error of the posed mesh."""
     actor, skinning = selection.part.actor, options.skinning
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     if figure.skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
     assert pose is not None  # figures with joints have a pose
@@ -102,7 +102,7 @@ def _is_picture(name: str) -> bool:
 
 def _as_rig(actor: Actor, skinning: Skinning) -> tuple[_CourseSkeleton, Figure, np.ndarray | None]:
     """Return the figure in the form of the files, and the original vertex of each split vertex."""
-    pose = actor.require_pose()
+    pose = actor.pose
     figure = scaled(shaped(actor.figure, pose.shape_weights), pose.figure_scale)
     skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
     course = course_skeleton(skeleton, pose)
@@ -123,7 +123,7 @@ def _as_rig(actor: Actor, skinning: Skinning) -> tuple[_CourseSkeleton, Figure, 
 
 def _scaling_bindings(actor: Actor, course: _CourseSkeleton) -> Floats:
     """Return inverse binding matrices that scale as the posed joints do: (J, 4, 4)."""
-    figure, pose = actor.figure, actor.require_pose()
+    figure, pose = actor.figure, actor.pose
     skin = shaped(figure, pose.shape_weights).require_skin()
     # With the skinning matrices M of the figure and the matrices W of the unscaled joints in the
     # same pose, both in the scaled figure, the bindings are W^-1 M.
@@ -168,7 +168,7 @@ def _changed(actor: Actor, course: _CourseSkeleton) -> list[Diagnostic]:
                     their=agree(n, "its", "their"),
                 )
             )
-    if (np.abs(actor.require_pose().scales - 1.0) > _ROUNDED).any():
+    if (np.abs(actor.pose.scales - 1.0) > _ROUNDED).any():
         notes.append(
             note(
                 "X005.skel-scaled: joints are scaled, which .skel cannot store: the bindings of "
@@ -225,7 +225,7 @@ def _error(
     actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
 ) -> list[Diagnostic]:
     """Read the files back and compare their pose with the posed figure."""
-    figure, pose = actor.figure, actor.require_pose()
+    figure, pose = actor.figure, actor.pose
     skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
     joints = np.empty((figure.require_skeleton().n_joints, 3))

@@ -44,7 +44,7 @@ def places_of(
     if binding:
         positions, normals = mesh.positions, mesh.normals
     else:
-        positions, normals = deform(actor.figure, actor.pose, skinning or Skinning())
+        positions, normals = deform(actor.figure, actor.own_pose, skinning or Skinning())
     corners = mesh.triangles[finding.triangles]
     touched = np.concatenate([finding.vertices, corners.ravel()])
     return Places(
@@ -77,8 +77,8 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
             return np.zeros((0, 3))
         seen = actor.points[joints]
         return apply_transform(actor.placement, seen[seen[:, 3] > 0.0, :3])
-    if len(joints) and figure.skeleton is not None and actor.pose is not None:
-        world = joint_matrices(figure, actor.pose)[joints]
+    if len(joints) and figure.skeleton is not None and actor.own_pose is not None:
+        world = joint_matrices(figure, actor.own_pose)[joints]
         return apply_transform(actor.placement, world[:, :3, 3])
     return np.zeros((0, 3))
 
@@ -90,10 +90,10 @@ def _middle(actor: Actor) -> Floats:
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
         middle = seen.mean(axis=0, keepdims=True) if len(seen) else seen
         return apply_transform(actor.placement, middle)
-    if figure.skeleton is None or actor.pose is None:
+    if figure.skeleton is None or actor.own_pose is None:
         return np.zeros((0, 3))
     roots = np.flatnonzero(figure.skeleton.parents < 0)
-    return apply_transform(actor.placement, joint_matrices(figure, actor.pose)[roots, :3, 3])
+    return apply_transform(actor.placement, joint_matrices(figure, actor.own_pose)[roots, :3, 3])
 
 
 def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:

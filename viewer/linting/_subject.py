@@ -289,7 +289,7 @@ def _track(subject: Subject) -> Track | None:
         times = key_times(subject, clip)
         count, per_frame = len(times), _per_frame(subject, clip)
         numbers = frame_numbers(subject, times)
-    frames = frames_of(figure, clip, times, actor.pose)
+    frames = frames_of(figure, clip, times, actor.own_pose)
     scale = mean_scale(actor.placement)
     is_bound = figure.is_attached and not subject.lacks("bindings")
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None

@@ -156,7 +156,7 @@ def _path(actor: Actor) -> _Path | None:
     if clip is None or figure.skeleton is None:
         return None
     times = clip.timing.start + np.arange(clip.timing.n_frames) / clip.timing.frame_rate
-    frames = frames_of(figure, clip, times, actor.pose)
+    frames = frames_of(figure, clip, times, actor.own_pose)
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     roots = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
     roots = roots + frames.figure_translations

@@ -21,7 +21,7 @@ _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
 
 def check(subject: Subject) -> Iterator[Finding]:
     """Check the skeleton and the current pose of an actor."""
-    skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
+    skeleton, pose = subject.actor.figure.skeleton, subject.actor.own_pose
     if skeleton is None:
         return
     yield from _names(subject, skeleton)

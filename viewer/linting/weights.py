@@ -160,12 +160,12 @@ def _label(subject: Subject, joint: int) -> str:
 def _some_poses(actor: Actor) -> list[Pose]:
     """Return the rest pose, the current pose, and some poses of the clip, or else random ones."""
     figure, clip = actor.figure, actor.joint_motion
-    assert figure.skeleton is not None and actor.pose is not None  # checked by the callers
+    assert figure.skeleton is not None  # checked by the callers
     rest = figure_pose(figure)
     poses = [rest, actor.pose]
     if clip is not None:
         times = np.linspace(clip.start, clip.end, _COUNT)
-        frames = frames_of(figure, clip, times, actor.pose, interpolate=True)
+        frames = frames_of(figure, clip, times, actor.own_pose, interpolate=True)
         return poses + [
             pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
         ]

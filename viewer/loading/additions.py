@@ -24,13 +24,13 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
     for path, pixels in contents.pictures:
         trial.figure = with_texture(trial.figure, path, pixels)
     for path, record in contents.poses:
-        if trial.pose is None:
+        if trial.own_pose is None:
             raise RigError.fault(wording.POSE, path, figure=actor.figure.name)
         notes += apply_pose(path, record, trial)
     # Nothing after this line can fail.
-    if actor.pose is not None and trial.pose is not None:
+    if actor.own_pose is not None and trial.own_pose is not None:
         for name in Pose.__slots__:
-            setattr(actor.pose, name, getattr(trial.pose, name))
+            setattr(actor.own_pose, name, getattr(trial.own_pose, name))
     is_same = trial.figure is actor.figure
     return actor if is_same else replace(actor, figure=trial.figure), notes
 
@@ -39,7 +39,6 @@ def apply_pose(
     path: Path, record: PoseRecord, actor: Actor, drop_excess: bool = True
 ) -> list[Diagnostic]:
     """Apply a file's pose record, if it matches, to an actor; return messages on inexact data."""
-    assert actor.pose is not None  # checked by the callers
     try:
         misfit = space_misfit(record.shape_space, actor.figure)
         if misfit is not None and misfit.key == "C019.model":

@@ -228,7 +228,7 @@ def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
                         figure=figure.name,
                     )
                 figure = with_morphs(figure, [target])
-                actors[index] = replace(actor, figure=figure, pose=None)
+                actors[index] = replace(actor, figure=figure, own_pose=None)
                 break
             except RigError as refused:
                 problem = problem or refused
@@ -317,7 +317,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
     problem: FormatError | None = None
     for actor in actors:
-        if actor.pose is not None:
+        if actor.own_pose is not None:
             try:
                 return apply_pose(path, record, actor)
             except FormatError as found:

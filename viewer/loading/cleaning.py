@@ -190,7 +190,9 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
     lift = np.zeros(3)
     lift[2 if scene.up == "z" else 1] = -height
     moved = np.linalg.solve(actor.placement[:3, :3], lift)
-    place = np.zeros((clip.n_rows, 3)) if actor.pose is None else actor.pose.figure_translation
+    place = (
+        np.zeros((clip.n_rows, 3)) if actor.own_pose is None else actor.own_pose.figure_translation
+    )
     own = clip.figure_translations
     places = moved + (np.broadcast_to(place, (clip.n_rows, 3)) if own is None else own)
     values = {

@@ -97,7 +97,7 @@ def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) ->
         if (
             skeleton is not None
             and suits(clip, skeleton)
-            and actor.pose is not None
+            and actor.own_pose is not None
             and actor.clip is None
         ):
             actor.clip = clip

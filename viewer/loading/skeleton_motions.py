@@ -192,7 +192,7 @@ def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
             place = next(n for n, actor in enumerate(draft.actors) if actor is one.actor)
             figure, origin = read_from(one.path, scaled.figure), (one.path, scaled.clip)
             draft.actors[place] = replace(
-                one.actor, figure=figure, clip=scaled.clip, clip_origin=origin, pose=None
+                one.actor, figure=figure, clip=scaled.clip, clip_origin=origin, own_pose=None
             )
         if one.motion.unit_note is not None:
             key = (

@@ -94,7 +94,7 @@ class Casters:
         for _, mesh in self.meshes.singles:
             found += [mesh, mesh.n_updates]
         for actor in self.lineup.alone:
-            pose = actor.pose
+            pose = actor.own_pose
             found += [placement_of(actor, self.options).tobytes(), pose and pose.skinning_key]
         if self.lineup.points:
             found.append(object())  # their size depends on the camera: always different
@@ -150,7 +150,7 @@ def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
     if shows_mesh(actor.figure, options):
         parts.append(_mesh_spheres(actor, options))
     if shows_skeleton(actor, options):
-        pose = actor.require_pose()
+        pose = actor.pose
         skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
         world = posed_skeleton(skeleton, pose).world[None]
         parts.append(_joint_spheres(actor.figure, skeleton, world)[0])
@@ -165,7 +165,7 @@ def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
 
 
 def _mesh_spheres(actor: Actor, options: DisplayOptions) -> Floats:
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     if options.show == "binding" or pose is None or not figure.is_attached:
         return box_spheres(bounding_box(figure.require_mesh().positions))
     figure = shaped(figure, pose.shape_weights)

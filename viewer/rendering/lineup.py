@@ -52,7 +52,7 @@ class Crowd:
 
     def __init__(self, actors: list[Actor]) -> None:
         self.actors = actors
-        self.shape_weights: Floats = actors[0].require_pose().shape_weights.copy()
+        self.shape_weights: Floats = actors[0].pose.shape_weights.copy()
         self.poses: list[Pose] = []
         """The poses of the actors, set again when an actor gets another one."""
         self.opacities: Floats = np.ones(len(actors))
@@ -212,7 +212,7 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
     """
     # What an actor draws, but for the numbers of poses and placements. Lists of the same objects
     # are compared quickly.
-    poses = [actor.pose for actor in actors]
+    poses = [actor.own_pose for actor in actors]
     states = (
         [actor.figure for actor in actors],
         poses,
@@ -256,7 +256,7 @@ def _crowds(
     kinds: dict[int, tuple[bool, bool]] = {}
     groups: dict[CrowdKey, list[Actor]] = {}
     for actor in actors:
-        pose, figure = actor.pose, actor.figure
+        pose, figure = actor.own_pose, actor.figure
         if pose is None or actor.hidden_parts:
             continue
         if id(figure) not in kinds:
@@ -277,7 +277,7 @@ def _joint_crowds(
         return {}
     groups: dict[CrowdKey, list[Actor]] = {}
     for actor in with_skeleton(actors, options):
-        pose, figure = actor.pose, actor.figure
+        pose, figure = actor.own_pose, actor.figure
         if pose is None or shows_mesh(figure, options) or options.opacity * actor.opacity != 1.0:
             continue
         if figure.require_skeleton().n_joints <= _MOST_JOINTS:
@@ -296,7 +296,7 @@ def _large(
             known = before.get(key)
             is_known = known is not None and known.actors == group
             crowd = found[key] = known if known is not None and is_known else Crowd(group)
-            crowd.poses = [actor.require_pose() for actor in group]
+            crowd.poses = [actor.pose for actor in group]
             crowd.opacities = np.array([options.opacity * actor.opacity for actor in group])
     return found
 
@@ -362,7 +362,7 @@ def with_markers(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor
     return [
         actor
         for actor in actors
-        if actor.figure.keypoints is not None and actor.is_drawn and actor.pose is not None
+        if actor.figure.keypoints is not None and actor.is_drawn and actor.own_pose is not None
     ]
 
 
@@ -374,6 +374,6 @@ def has_joint_marks(options: DisplayOptions) -> bool:
 
 def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
     """Return the matrix from figure to scene space: actor placement times pose placement."""
-    if actor.pose is None or options.show == "binding":
+    if actor.own_pose is None or options.show == "binding":
         return actor.placement
-    return actor.placement @ placement_matrix(actor.pose)
+    return actor.placement @ placement_matrix(actor.own_pose)

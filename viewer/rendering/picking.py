@@ -186,7 +186,7 @@ class PickPass:
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self._buffers.keypoints_of(actor)
-        markers.update(actor.require_pose(), options.skinning)
+        markers.update(actor.pose, options.skinning)
         program = self._programs.drawing("joint", fragment="pick")
         self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
         draw_boxes(program, markers.boxes, actor.placement, in_front(view), options)

@@ -183,7 +183,7 @@ class Renderer:
                 self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
         for actor in lineup.markers:
             markers = self.buffers.keypoints_of(actor)
-            markers.update(actor.require_pose(), options.skinning)
+            markers.update(actor.pose, options.skinning)
             # Marker positions already include the placement of the pose.
             place, opacity = actor.placement, options.opacity * actor.opacity
             self.late.keypoint_pass.draw(markers, place, view, options, opacity)

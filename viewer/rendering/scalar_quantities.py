@@ -44,7 +44,7 @@ class ScalarQuantities:
         # Figures without the quantity are drawn with the default shading.
         name = name_for(options.scalar, *selected)
         for actor, buffer in values:
-            pose = None if options.show == "binding" else actor.pose
+            pose = None if options.show == "binding" else actor.own_pose
             # On the selected actor, the joint is given by its index; on other actors, by its name.
             is_selected = actor is selected[0] and name != options.scalar
             its_name = f"{options.scalar}:#{selected[1]}" if is_selected else name

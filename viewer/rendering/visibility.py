@@ -73,7 +73,7 @@ def update_meshes(buffers: ActorBuffers, lineup: Lineup, options: DisplayOptions
     """Skin changed meshes before drawing; a framebuffer must be bound."""
     meshes = prepare_meshes(buffers, lineup, options)
     for actor, mesh in meshes.singles:
-        pose = None if options.show == "binding" else actor.pose
+        pose = None if options.show == "binding" else actor.own_pose
         mesh.hidden_parts = actor.hidden_parts
         mesh.update(pose, options.skinning)
     for group, instances in meshes.instanced:
@@ -87,7 +87,7 @@ def update_skeletons(buffers: ActorBuffers, lineup: Lineup, options: DisplayOpti
     for joint_group in lineup.joint_groups:
         buffers.joint_group(joint_group).update_group(joint_group)
     for actor in lineup.skeletons_alone:
-        pose = actor.pose
+        pose = actor.own_pose
         if pose is not None and not buffers.skeleton(actor).is_current(pose, options):
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))

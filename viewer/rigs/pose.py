@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +15,23 @@ from viewer.errors import RigError
 from viewer.phrases import counted, printable
 from viewer.rigs.arrays import Floats, Ints, span
 from viewer.rigs.constraints.evaluation import constrained_matrices
-from viewer.rigs.geometry.rotation import quaternion_entries
+from viewer.rigs.geometry.rotation import (
+    matrix_to_euler,
+    matrix_to_quaternion,
+    matrix_to_rotation_vector,
+    quaternion_entries,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
 from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.memo import Memo, NumberKey
-from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs, find_joint
 
 if TYPE_CHECKING:
     from viewer.rigs.skin import Skin
 
 _orders: Memo[Skeleton, _AxisProducts] = Memo()
+_ball_rows: Memo[Skeleton, Ints] = Memo()
 _Indices = NDArray[np.intp]
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -33,6 +42,9 @@ _PER_JOINT = 10  # a translation, a quaternion and three scale factors
 @dataclass(slots=True, eq=False)
 class Pose:
     """The mutable state of one figure; arrays are changed in place.
+
+    ``pose["left_knee"]`` is the joint's rotation relative to its parent as a rotation vector (3,),
+    radians; assigning one rotates the joint.
 
     ``rest_pose`` makes one.
     """
@@ -48,6 +60,8 @@ class Pose:
     """(S,). Weights of the figure's blend shapes; missing trailing weights are treated as 0."""
     figure_scale: float = 1.0
     """Scale of the whole skinned figure about its origin, applied after skinning."""
+    skeleton: Skeleton | None = field(default=None, repr=False)
+    """The joints that ``pose["left_knee"]`` names."""
     posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
     """Cached matrices; up to date if they have the key of the current values."""
     _key: NumberKey | None = field(default=None, init=False, repr=False)
@@ -115,9 +129,34 @@ class Pose:
         self._key = NumberKey(*arrays) if self._key is None else self._key.updated(*arrays)
         return self._key
 
+    def __getitem__(self, joint: str) -> Floats:
+        """Return a joint's rotation relative to its parent as a rotation vector, radians: (3,)."""
+        skeleton, index = self._find(joint)
+        return matrix_to_rotation_vector(joint_rotations(skeleton, self)[index])
+
+    def __setitem__(self, joint: str, rotation: Floats | Sequence[float]) -> None:
+        """Rotate a joint relative to its parent by a rotation vector, radians: (3,)."""
+        skeleton, index = self._find(joint)
+        try:
+            vector = np.asarray(rotation, dtype=np.float64)
+        except (TypeError, ValueError):
+            vector = np.zeros(0)
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation}")
+        joints, turned = np.array([index], dtype=np.int32), rotation_vector_to_matrix(vector)[None]
+        set_joint_rotations(skeleton, self, joints, turned, "quaternion")
+
+    def _find(self, joint: str) -> tuple[Skeleton, int]:
+        """Return the skeleton, and the index of a joint in it."""
+        check_type("joint", joint, str)
+        if self.skeleton is None:
+            raise RigError(f"{joint}: expected the pose of an actor, found one without joint names")
+        return self.skeleton, find_joint(self.skeleton, joint)
+
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""
-        return Pose(self.values.copy(), self.n_dofs, self.shape_weights.copy(), self.figure_scale)
+        numbers = self.values.copy(), self.n_dofs, self.shape_weights.copy()
+        return Pose(*numbers, self.figure_scale, self.skeleton)
 
 
 class PoseArrays(NamedTuple):
@@ -197,7 +236,7 @@ def rest_pose(skeleton: Skeleton) -> Pose:
         *(clamp_dofs(skeleton, skeleton.rest_dofs), np.zeros(3 * skeleton.n_joints)),
         *(skeleton.rest_rotations.ravel(), skeleton.rest_scales.ravel(), np.zeros(3)),
     )
-    return Pose(np.concatenate(parts), skeleton.n_dofs)
+    return Pose(np.concatenate(parts), skeleton.n_dofs, skeleton=skeleton)
 
 
 def zero_pose(skeleton: Skeleton) -> Pose:
@@ -284,6 +323,70 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
     if skeleton.posing is not None:
         return skeleton.posing.rotations(dofs)
     return _order_of(skeleton).at(dofs)
+
+
+def rotation_rows(skeleton: Skeleton) -> Ints:
+    """Return ball joints' DOF rows about x, y, z (J, 3); -1 for joints with other rotations."""
+    return _ball_rows.get(skeleton, None, lambda: _rows_of_balls(skeleton))
+
+
+def _rows_of_balls(skeleton: Skeleton) -> Ints:
+    rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
+    rotations = np.flatnonzero(skeleton.dof_kinds >= 3)
+    counts = np.bincount(skeleton.dof_joints[rotations], minlength=skeleton.n_joints)
+    rows[skeleton.dof_joints[rotations], skeleton.dof_kinds[rotations] - 3] = rotations
+    is_ball = (counts == 3) & (rows >= 0).all(axis=1) & (np.diff(rows, axis=1) > 0).all(axis=1)
+    rows[~is_ball] = -1
+    rows.flags.writeable = False
+    return rows
+
+
+Beyond = Literal["cut", "dofs", "quaternion"]
+"""Where a rotation beyond the limits of a ball joint goes: it is cut off at the limits, the DOFs
+exceed them, or the quaternion beneath the DOFs has what they lack."""
+
+
+def set_joint_rotations(
+    skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, beyond: Beyond = "cut"
+) -> None:
+    """Set joints' rotations (N, 3, 3) relative to parents, in place, as ``rotate_joints`` does."""
+    dofs = pose.dofs[None].copy()
+    pose.rotations[joints] = rotate_joints(skeleton, dofs, joints, rotations[None], beyond)[0]
+    pose.dofs[:] = dofs[0]
+
+
+def rotate_joints(
+    skeleton: Skeleton, dofs: Floats, joints: Ints, rotations: Floats, beyond: Beyond
+) -> Floats:
+    """Set DOFs (T, D), in place, to rotations (T, N, 3, 3) of joints; return quaternions (T, N, 4).
+
+    A ball joint's DOFs become the angles about x, y, z; other joints keep their DOFs as near to 0
+    as limits allow, and the quaternion has the rest.
+    """
+    joints = np.asarray(joints)
+    rows = rotation_rows(skeleton)[joints]
+    is_ball = rows[:, 0] >= 0
+    # A slice copies nothing.
+    balls = slice(None) if is_ball.all() else np.flatnonzero(is_ball)
+    rest = skeleton.rest_rotations[joints]
+    quaternions = np.broadcast_to(rest, (len(dofs), *rest.shape))
+    within = np.swapaxes(quaternion_to_matrix(rest[balls]), -1, -2) @ rotations[:, balls]
+    angles = matrix_to_euler(within)
+    dofs[:, rows[balls]] = angles
+    others = joints[~is_ball]
+    if len(others):
+        dofs[:, np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
+    if beyond != "dofs":
+        np.clip(dofs, *skeleton.dof_limits.T, out=dofs)
+    has_rest = np.broadcast_to(~is_ball, quaternions.shape[:-1]).copy()
+    if beyond == "quaternion":
+        has_rest[:, balls] = (dofs[:, rows[balls]] != angles).any(axis=-1)
+    if has_rest.any():
+        # R = Q R(DOFs), so Q = R R(DOFs)^T has what the DOFs lack.
+        held = dof_rotations(skeleton, dofs)[:, joints]
+        left = matrix_to_quaternion(rotations @ np.swapaxes(held, -1, -2))
+        quaternions = np.where(has_rest[..., None], left, quaternions)
+    return quaternions
 
 
 def _order_of(skeleton: Skeleton) -> _AxisProducts:

@@ -24,7 +24,7 @@ from viewer.rigs.mesh import bounding_box, box_size, visible_vertices
 from viewer.rigs.motion.timing import DEFAULT_RATE, frame_times
 from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.shape import shaped_skeleton
-from viewer.rigs.skeleton import FIRST_ROTATION, find_joint
+from viewer.rigs.skeleton import FIRST_ROTATION
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -66,8 +66,8 @@ class Actor:
 
     figure: Figure
     """Immutable; actors may share it."""
-    pose: Pose | None = None
-    """This actor's own pose; None if the figure has no skeleton."""
+    own_pose: Pose | None = None
+    """What ``pose`` returns; None if the figure has no skeleton."""
     clip: Motion | None = None
     """Its motion, which ``pose_actors`` evaluates."""
     placement: Floats = field(default_factory=lambda: np.eye(4))
@@ -156,14 +156,22 @@ class Actor:
 
     def __post_init__(self) -> None:
         check_type("figure", self.figure, Figure)
-        if self.pose is None and self.figure.skeleton is not None:
-            self.pose = figure_pose(self.figure)
+        if self.own_pose is None and self.figure.skeleton is not None:
+            self.own_pose = figure_pose(self.figure)
 
-    def require_pose(self) -> Pose:
-        """Return the pose; ``RigError`` if there is none, as without a skeleton."""
-        if self.pose is None:
+    @property
+    def pose(self) -> Pose:
+        """Its pose; ``RigError`` if there is none, as without a skeleton."""
+        if self.own_pose is None:
             raise RigError(f"{self.name} has no pose, as it has no skeleton")
-        return self.pose
+        # Names of joints are those of the actor's figure, which may have been replaced.
+        self.own_pose.skeleton = self.figure.skeleton
+        return self.own_pose
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        check_type("pose", pose, Pose)
+        self.own_pose = pose
 
     def require_clip(self) -> Motion:
         """Return the motion; ``RigError`` if there is none."""
@@ -189,31 +197,12 @@ class Actor:
         return f"<Actor {printable(self.name, _LONGEST)}: {', '.join(parts)}>"
 
     def __getitem__(self, joint: str) -> Floats:
-        """Return a joint's rotation relative to its parent as a rotation vector, radians: (3,)."""
-        from viewer.rigs.geometry.rotation import matrix_to_rotation_vector
-        from viewer.rigs.pose import joint_rotations
-
-        check_type("joint", joint, str)
-        skeleton = self.figure.require_skeleton()
-        turned = joint_rotations(skeleton, self.require_pose())
-        return matrix_to_rotation_vector(turned[find_joint(skeleton, joint)])
+        """Return a joint's rotation, as ``pose[joint]`` does."""
+        return self.pose[joint]
 
     def __setitem__(self, joint: str, rotation: Floats | Sequence[float]) -> None:
-        """Rotate a joint relative to its parent by a rotation vector, radians: (3,)."""
-        from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
-        from viewer.rigs.posing.pose_vector import set_joint_rotations
-
-        check_type("joint", joint, str)
-        skeleton = self.figure.require_skeleton()
-        try:
-            vector = np.asarray(rotation, dtype=np.float64)
-        except (TypeError, ValueError):
-            vector = np.zeros(0)
-        if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation}")
-        joints = np.array([find_joint(skeleton, joint)], dtype=np.int32)
-        turned = rotation_vector_to_matrix(vector)[None]
-        set_joint_rotations(skeleton, self.require_pose(), joints, turned, "quaternion")
+        """Rotate a joint, as ``pose[joint] = rotation`` does."""
+        self.pose[joint] = rotation
 
     def vertices(self, time: float | None = None, skinning: Skinning | None = None) -> Floats:
         """Return the vertices in the scene's space, at one time or of all frames.
@@ -310,12 +299,12 @@ class Actor:
         motion, figure = self.joint_motion, self.figure
         figure.require_skeleton()
         if motion is None:
-            return still_frames(figure, self.require_pose())
+            return still_frames(figure, self.pose)
         if time is None:
             times = frame_times(motion.start, motion.end, motion.frame_rate)
         else:
             times = np.array([self._reached(time) - self.offset])
-        return frames_of(figure, motion, times, self.pose)
+        return frames_of(figure, motion, times, self.own_pose)
 
     def _reached(self, time: float) -> float:
         """Return a time; RigError if a captured motion lacks it, as only keys hold or run on."""
@@ -336,7 +325,7 @@ class Actor:
         """Return a copy that is posed and placed independently; figure and clip are shared."""
         return replace(
             self,
-            pose=None if self.pose is None else self.pose.copy(),
+            own_pose=None if self.own_pose is None else self.own_pose.copy(),
             placement=self.placement.copy(),
             points=None if self.points is None else self.points.copy(),
         )
@@ -483,9 +472,9 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
             actor.is_present = is_present
             if found.points is not None:
                 actor.points = found.points[row] if is_present else None
-            elif is_present and actor.pose is not None:
+            elif is_present and actor.own_pose is not None:
                 rows.append(row)
-                poses.append(actor.pose)
+                poses.append(actor.own_pose)
         if figure.skeleton is not None and poses:
             set_poses(found, np.array(rows), figure.skeleton, poses)
         for actor in group:
@@ -495,7 +484,7 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
 
 def still_pose(actor: Actor) -> Pose:
     """Return a copy of an actor's pose, with what its motion sets reset to the pose of the file."""
-    own, pose, motion = figure_pose(actor.figure), actor.require_pose().copy(), actor.joint_motion
+    own, pose, motion = figure_pose(actor.figure), actor.pose.copy(), actor.joint_motion
     if motion is None:
         return pose
     skeleton = actor.figure.require_skeleton()
@@ -546,14 +535,16 @@ def actor_points(actor: Actor, show: Shown = "skin") -> Floats:
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
-    if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        shape = shaped_skeleton(figure, actor.pose.shape_weights)
-        joints = skeleton_points(shape, actor.pose)
-        parts.append(apply_transform(placement_matrix(actor.pose), joints))
+    if figure.skeleton is not None and actor.own_pose is not None and shows_skeleton:
+        shape = shaped_skeleton(figure, actor.own_pose.shape_weights)
+        joints = skeleton_points(shape, actor.own_pose)
+        parts.append(apply_transform(placement_matrix(actor.own_pose), joints))
         # Joints that coincide have no size to frame.
         shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
     if figure.mesh is not None and shows_mesh:
-        points = figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.pose)
+        points = (
+            figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.own_pose)
+        )
         if actor.hidden_parts:
             points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
         parts.append(points)
@@ -581,7 +572,7 @@ def scene_unit(scene: Scene) -> str:
     if actor is None:
         return ""
     metres = METRES[actor.figure.unit] / (float(np.linalg.norm(actor.placement[:3, 0])) or 1.0)
-    scales = (1.0,) if actor.pose is None else (actor.pose.figure_scale or 1.0, 1.0)
+    scales = (1.0,) if actor.own_pose is None else (actor.own_pose.figure_scale or 1.0, 1.0)
     return next((unit for scale in scales if (unit := _unit_of(metres / scale))), "")
 
 

@@ -232,7 +232,7 @@ def test_figure_without_skeleton_shows_a_message(drive, rig):
     assert "Filter" not in hand.state.item_rects
     for name in ("r", "s", "k", "f"):
         hand.key(name)
-    assert hand.state.actor.pose is None
+    assert hand.state.actor.own_pose is None
 
 
 @pytest.mark.parametrize("text", [chain(5000), comb(5000), comb(40_000)], ids=len)
@@ -439,7 +439,7 @@ def test_placement_and_scale_of_the_figure_are_applied():
 def test_missing_joint_returns_none():
     actor = turned_actor()
     assert posed_joint(actor, -1) is None and posed_joint(actor, 3) is None
-    actor.pose = None
+    actor.own_pose = None
     assert posed_joint(actor, 0) is None
 
 

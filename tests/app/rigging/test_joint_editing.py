@@ -300,7 +300,7 @@ def test_cancelled_binding_and_drags_leave_the_figure(drive, monkeypatch):
     assert not editing.is_on
     undo(hand)
     undo(hand)
-    assert figure(hand).skeleton is None and hand.state.actor.pose is None
+    assert figure(hand).skeleton is None and hand.state.actor.own_pose is None
 
 
 def test_own_joints_of_a_bound_figure_keep_their_weights(drive):

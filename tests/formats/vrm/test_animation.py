@@ -86,7 +86,7 @@ def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path):
     assert skeleton.names == ("m0", "m1", "m2", "m3", "m5", "m4")
     assert actor.clip is not None and (actor.clip.start, actor.clip.end) == (0.0, 1.0)
     pose_actors([actor], 1.0)
-    arm = joint_matrices(actor.figure, actor.require_pose())[skeleton.names.index("m4"), :3, 3]
+    arm = joint_matrices(actor.figure, actor.pose)[skeleton.names.index("m4"), :3, 3]
     # The limb of 0.4 is along x, the chain of 0, 0.5, 0 is vertical, and the 0.2 along x points
     # backwards.
     assert_allclose(arm, [0.4, 1.5 + 0.3, -0.2], atol=1e-6)
@@ -100,11 +100,11 @@ def test_character_plays_a_motion_with_facial_expressions(tmp_path):
     assert figure.blend_shapes is not None
     for time, weight in ((0.25, 0.5), (1.0, 1.0)):
         pose_actors([actor], time)
-        pose = actor.require_pose()
+        pose = actor.pose
         column = figure.blend_shapes.names.index("happy")
         # Weights above 1 are clamped; the keys are sampled at 30 frames per second.
         assert_allclose(pose.shape_weights[column], weight, atol=0.02)
-    worlds = joint_matrices(figure, actor.require_pose())
+    worlds = joint_matrices(figure, actor.pose)
     names = figure.require_skeleton().names
     arm, below = (worlds[names.index(name)] for name in ("c3", "c4"))
     # Rotations of hips and arm, then of the rest pose: Ry Rz Rx, each by 90 degrees.
@@ -131,7 +131,7 @@ def test_captured_body_drives_a_character(tmp_path):
         for actor, pair in ((driven, ("c3", "c4")), (body, ("left_shoulder", "left_elbow"))):
             pose_actors([actor], time)
             names = actor.figure.require_skeleton().names
-            places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
+            places = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
             way = places[names.index(pair[1])] - places[names.index(pair[0])]
             ways.append(way / np.linalg.norm(way))
         assert_allclose(ways[0], ways[1], atol=1e-9)
@@ -265,7 +265,7 @@ def test_exported_poses_include_the_effect_of_constraints(tmp_path):
     for name in (path, again):
         (actor,) = load(name).actors
         pose_actors([actor], 1.0)
-        corners = deform(actor.figure, actor.require_pose())[0]
+        corners = deform(actor.figure, actor.pose)[0]
         # The parent rotates to 180 degrees, and the joint by its 90 degrees relative to the rest
         # pose.
         assert_allclose(corners, [[0, 0, 0], [0, -1, 0], [1, 0, 0]], atol=1e-6)

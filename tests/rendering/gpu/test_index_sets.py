@@ -197,7 +197,7 @@ def test_closed_figures_leave_no_objects_behind(offscreen):
         for count in (1, 9):
             opened = scene(count)
             for frame, options in enumerate(OPTIONS):
-                opened.actors[0].require_pose().dofs[4] = 0.1 * frame
+                opened.actors[0].pose.dofs[4] = 0.1 * frame
                 draw(offscreen, opened, options)
         draw(offscreen, Scene([]), plain())
         with offscreen.context:

@@ -333,7 +333,7 @@ def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is
     mesh = closed(8)
     skin = skin_from_lists([[(0, 1.0)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), skin))])
-    pose = scene.actors[0].require_pose()
+    pose = scene.actors[0].pose
     pose.scales[:] = 1.0, scale, 1.0
     draw(offscreen, scene, LIT)
     assert (regions(offscreen, scene, front()) == ()) is is_hidden

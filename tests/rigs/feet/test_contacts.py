@@ -13,8 +13,7 @@ from viewer.rigs.feet.contacts import FootPath, foot_contacts
 from viewer.rigs.feet.curves import smooth_curves
 from viewer.rigs.feet.soles import extent, soles_of
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
-from viewer.rigs.pose import rest_pose
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import rest_pose, set_joint_rotations
 from viewer.rigs.skinning import deform, joint_matrices
 
 RATE, COUNT = 30.0, 60

@@ -271,7 +271,7 @@ def test_onion_has_poses_at_even_times_with_rising_opacity():
     still, *poses = onion(scene, 6).actors
     assert still.clip is None and still.opacity == 1.0
     # The six times in one second do not include frame 5, the only missing frame.
-    places = [actor.require_pose().figure_translation[0] for actor in poses]
+    places = [actor.pose.figure_translation[0] for actor in poses]
     np.testing.assert_allclose(places, SPEED * np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.0]), atol=1e-12)
     expected = np.linspace(1.0, FAINTEST, 6)
     np.testing.assert_allclose([actor.opacity for actor in poses], expected)

@@ -18,17 +18,10 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.motion.body_motion import parameter_pose
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.pose import joint_rotations, rest_pose
+from viewer.rigs.pose import joint_rotations, rest_pose, rotation_rows, set_joint_rotations
 from viewer.rigs.posing.dof_text import beyond_text, dof_value_text
 from viewer.rigs.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
-from viewer.rigs.posing.pose_vector import (
-    PoseLayout,
-    own_numbers,
-    read_vector,
-    rotation_rows,
-    set_joint_rotations,
-    write_vector,
-)
+from viewer.rigs.posing.pose_vector import PoseLayout, own_numbers, read_vector, write_vector
 from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skinning import deform

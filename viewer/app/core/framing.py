@@ -90,8 +90,8 @@ class _MotionExtent:
         """Remember each actor's initial pose, so that editing a pose does not move the ground."""
         for actor in scene.actors:
             known = self._opened.get(id(actor))
-            if actor.pose is not None and (known is None or known[1] is not actor.figure):
-                self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
+            if actor.own_pose is not None and (known is None or known[1] is not actor.figure):
+                self._opened[id(actor)] = actor, actor.figure, actor.own_pose.copy()
 
     def _left(self, scene: Scene, clock: Clock, grows: bool) -> list[float]:
         """Return the times to sample next, and drop samples that are no longer needed."""
@@ -118,10 +118,10 @@ class _MotionExtent:
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
             # Hair and clothes hardly change the size of a motion, but simulating them takes long.
             actor.springs = None
-            if actor.pose is not None:
-                weights = actor.pose.shape_weights
+            if actor.own_pose is not None:
+                weights = actor.own_pose.shape_weights
                 actor.pose = self._opened[id(shown)][2].copy()
-                actor.pose.shape_weights = weights
+                actor.own_pose.shape_weights = weights
         if clock.has_motion:
             pose_actors(seen.actors, time, clock.interpolate_gaps)
             if not any(actor.is_drawn for actor in seen.actors):
@@ -211,7 +211,7 @@ def _growing(first: int, last: int) -> list[int]:
 def _own_shape(actor: Actor) -> bytes:
     """Return a key that identifies an actor's shape; empty if its motion sets the shape."""
     is_driven = actor.joint_motion is not None and actor.joint_motion.sets_shape
-    return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
+    return b"" if actor.own_pose is None or is_driven else actor.own_pose.shape_weights.tobytes()
 
 
 def _own_motion(actor: Actor) -> tuple[object, ...]:

@@ -47,7 +47,7 @@ def no_parts(state: AppState) -> str:
 
 def no_pose(state: AppState) -> str:
     """Return the reason why the chosen actor cannot be posed."""
-    if state.actor.pose is not None:
+    if state.actor.own_pose is not None:
         return ""
     is_captured = state.actor.figure.points is not None
     return f"{'a set of captured points' if is_captured else 'this figure'} has no joints to pose"

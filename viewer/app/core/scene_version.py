@@ -71,7 +71,7 @@ def _version_of(actor: Actor, last: ActorVersion | None) -> ActorVersion:
     now = ActorVersion(
         actor,
         actor.figure,
-        None if actor.pose is None else pose_key(actor.pose),
+        None if actor.own_pose is None else pose_key(actor.own_pose),
         actor.clip,
         actor.offset,
         actor.visible,

@@ -327,7 +327,7 @@ def _restore_motion(version: SceneVersion, scene: Scene) -> None:
     scene.actors[:] = [one.actor for one in version.actors]
     for one in version.actors:
         actor = one.actor
-        actor.pose = None if one.pose is None else pose_of(one.pose)
+        actor.own_pose = None if one.pose is None else pose_of(one.pose)
         actor.clip, actor.offset, actor.animation = one.clip, one.offset, one.animation
         actor.drive = one.drive
 

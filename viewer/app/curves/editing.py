@@ -147,7 +147,7 @@ class DofKeys:
 
     def posed(self, actor: Actor, time: float, only_changed: bool) -> Clip:
         """Key an actor's pose at a time."""
-        return key_pose(self.clip, self.skeleton, actor.require_pose(), time, only_changed)
+        return key_pose(self.clip, self.skeleton, actor.pose, time, only_changed)
 
     def _changed(self, rows: Iterable[int], change: Callable[[Channel], Channel]) -> Clip:
         clip = self.clip
@@ -206,7 +206,7 @@ class TransformKeys:
 
     def added(self, rows: Iterable[int], time: float, actor: Actor) -> TransformClip:
         """Add keys on curves; rotations without keys get the values of the actor's pose."""
-        clip, now = self.clip, joint_values(self.skeleton, actor.require_pose())
+        clip, now = self.clip, joint_values(self.skeleton, actor.pose)
         # The components of a channel share their keys.
         wanted = {(row.path, row.joint, row.channel): row for row in map(self.row, rows)}
         for row in wanted.values():
@@ -236,7 +236,7 @@ class TransformKeys:
 
     def posed(self, actor: Actor, time: float, only_changed: bool) -> TransformClip:
         """Key an actor's pose at a time."""
-        pose = actor.require_pose()
+        pose = actor.pose
         return key_transform_pose(self.clip, actor.figure, pose, time, only_changed)
 
 
@@ -360,22 +360,22 @@ def keyed_of(actor: Actor) -> KeyedMotion | None:
 
 def can_have_keys(state: AppState) -> bool:
     """Return whether the chosen actor can get a clip: it has joints and no motion yet."""
-    return state.actor.pose is not None and state.actor.clip is None
+    return state.actor.own_pose is not None and state.actor.clip is None
 
 
 def new_clip(state: AppState) -> None:
     """Create a clip of the chosen actor's constant pose, with one key per DOF."""
     actor = state.actor
-    if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
+    if actor.own_pose is None or actor.figure.skeleton is None or actor.clip is not None:
         return
-    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.title, 0.0, _SECONDS)
+    actor.clip = clip_from_pose(actor.figure.skeleton, actor.own_pose, actor.title, 0.0, _SECONDS)
     state.say_status("New clip: this pose held for two seconds")
 
 
 def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     """Key the pose at the current time."""
     actor, keyed = state.actor, keyed_of(state.actor)
-    if keyed is None or actor.pose is None:
+    if keyed is None or actor.own_pose is None:
         return
     time = state.clock.time - actor.offset
     before = _n_keys(actor.clip)

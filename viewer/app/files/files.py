@@ -368,8 +368,8 @@ def _add(state: AppState, contents: Contents) -> None:
         state.history.exchange_actor(state.actor, actor)
         saved.exchange_actor(state.actor, actor)
         state.scene.actors[state.chosen_actor] = actor
-    if contents.poses and actor.pose is not None:
-        saved.add(SavedPose(actor, pose_key(actor.pose)))
+    if contents.poses and actor.own_pose is not None:
+        saved.add(SavedPose(actor, pose_key(actor.own_pose)))
     state.scene.files += contents.files
     added = [*contents.poses, *contents.pictures]
     state.say(*contents.diagnostics, *notes)

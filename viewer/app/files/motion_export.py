@@ -223,7 +223,9 @@ def save_motion(
     has_still = everyone and "pose" in EXPORTERS[kind].stores and _is_one_file(path)
     still = [each for each in state.scene.actors if has_still and each.clip is None]
     known, written = state.of(SavedWork), [one for each in motions for one in each.saved]
-    written += [SavedPose(each, pose_key(each.pose)) for each in still if each.pose is not None]
+    written += [
+        SavedPose(each, pose_key(each.own_pose)) for each in still if each.own_pose is not None
+    ]
     still = [each.copy() for each in still]
     n_paths = len({each.path for each in motions})
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
@@ -292,10 +294,10 @@ def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ..
     stores_all = any("clips" in kind.stores for kind in exporters_at(file))
     has_all = stores_all and keeps_keys(state.scene, actor)
     clips = (actor.clip, *(edited_aside(state.of(Animations), actor).values() if has_all else ()))
-    if actor.pose is None:
+    if actor.own_pose is None:
         return clips
     # A pose made by hand at this time is not part of the motion.
-    return (*clips, SavedPose(actor, pose_key(state.clock.posed(actor, actor.pose))))
+    return (*clips, SavedPose(actor, pose_key(state.clock.posed(actor, actor.own_pose))))
 
 
 def _parts(

@@ -149,14 +149,14 @@ def use_handles(state: AppState) -> bool:
     if handle is None:
         posing.has_missed = _is_beside_handle(state, place)
         return posing.has_missed
-    posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
+    posing.drag = Drag(state.actor, handle, Outcome(state.actor.pose, ""))
     return True
 
 
 def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
     """Pose the actor by the pointer; a release ends the drag, the right button cancels it."""
     posing = state.of(Posing)
-    if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
+    if state.actor is not drag.actor or drag.actor.own_pose is not drag.outcome.pose:
         drag.is_over = True  # the pose was undone, reset or closed during the drag
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_drag(state)
@@ -183,10 +183,10 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
 def _is_beside_handle(state: AppState, place: Place) -> bool:
     """Return whether a press narrowly missed a handle, so that it must not orbit the camera."""
     posing, posed, frame = state.of(Posing), selected(state), view_frame(state)
-    if posed is None or state.actor.pose is None:
+    if posed is None or state.actor.own_pose is None:
         return False
     if posing.tool == "rotate":
-        found = rings(posed, state.actor.pose, posing.orientation, frame)
+        found = rings(posed, state.actor.own_pose, posing.orientation, frame)
         return grab_ring(found, posed.center, frame, place, _BESIDE) is not None
     center = frame.place(posed.center)
     if center is not None and _apart(center, place) <= _BESIDE * frame.scale:
@@ -197,12 +197,6 @@ def _is_beside_handle(state: AppState, place: Place) -> bool:
 
 def _apart(one: Place, other: Place) -> float:
     return float(np.hypot(one[0] - other[0], one[1] - other[1]))
-
-
-def _pose(state: AppState) -> Pose:
-    pose = state.actor.pose
-    assert pose is not None  # checked by no_tool
-    return pose
 
 
 def _grabbed(state: AppState, place: Place) -> Handle | None:
@@ -221,7 +215,7 @@ def _grabbed(state: AppState, place: Place) -> Handle | None:
 def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     """Return the handle of the selected joint at a window position."""
     posing = state.of(Posing)
-    posed, pose = selected(state), state.actor.pose
+    posed, pose = selected(state), state.actor.own_pose
     if posed is None or pose is None:
         return None
     if posing.tool == "rotate":
@@ -241,7 +235,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
 
 def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
     """Return the handle at the joint, which moves it with its chain or translates it."""
-    pose, skeleton = _pose(state), posed.skeleton
+    pose, skeleton = state.actor.pose, posed.skeleton
     length = len(used_chain(skeleton, posed.joint, state.of(Posing).chain_length))
     if length:
         return ReachHandle(posed, pose, place, length)
@@ -341,7 +335,6 @@ def _draw_joints(state: AppState, pen: Pen) -> None:
 
 def _draw_arcs(state: AppState, pen: Pen, posed: PosedJoint) -> None:
     """Draw the limits of the joint's rotations."""
-    assert state.actor.pose is not None  # limits imply a posed joint
     unit = pen.frame.unit_length(posed.center)
     for rank, arc in enumerate(limit_arcs(posed, state.actor.pose)):
         # Each arc is a little smaller than the previous one, because axes may coincide.
@@ -359,7 +352,7 @@ def _draw_arcs(state: AppState, pen: Pen, posed: PosedJoint) -> None:
 
 def _draw_rings(state: AppState, pen: Pen, posed: PosedJoint, hot: Handle | None) -> None:
     """Draw the rings of the joint; during a drag, draw only the grabbed ring and the angle."""
-    drag, pose = _drag(state), state.actor.pose
+    drag, pose = _drag(state), state.actor.own_pose
     if drag is not None and isinstance(drag.handle, RotateHandle):
         _draw_rotation(pen, posed, drag.handle, drag.outcome.angle or 0.0)
         return

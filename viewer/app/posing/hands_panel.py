@@ -17,8 +17,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 from viewer.rigs.hands import Hand, hand_coefficients, hand_vectors
 from viewer.rigs.memo import Memo
-from viewer.rigs.pose import Pose, joint_rotations
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, joint_rotations, set_joint_rotations
 
 _REACH = 3.0  # range of a slider; larger values can be typed
 _CLAMP = imgui.SliderFlags_.always_clamp
@@ -28,7 +27,7 @@ _coefficients: Memo[Hand, Floats] = Memo()
 def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     posing = state.of(Posing)
-    figure, pose = state.actor.figure, state.actor.pose
+    figure, pose = state.actor.figure, state.actor.own_pose
     if not figure.hands or pose is None:
         offer_files(state, "This figure has no hand components: open a body model with hands.")
         return

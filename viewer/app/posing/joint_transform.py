@@ -20,13 +20,8 @@ from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import box_size
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.number_text import number_text
-from viewer.rigs.pose import Pose, joint_rotations
-from viewer.rigs.posing.pose_vector import (
-    PoseLayout,
-    own_numbers,
-    rotation_rows,
-    set_joint_rotations,
-)
+from viewer.rigs.pose import Pose, joint_rotations, rotation_rows, set_joint_rotations
+from viewer.rigs.posing.pose_vector import PoseLayout, own_numbers
 from viewer.rigs.skeleton import Skeleton
 
 _DRAGS = "drag, or Ctrl+click to type a value; double-click to reset"

@@ -97,7 +97,7 @@ def draw(state: AppState) -> None:
     if actor.figure.points is not None:
         _draw_captured_points(state, actor, actor.figure.points)
         return
-    if actor.figure.skeleton is None or actor.pose is None:
+    if actor.figure.skeleton is None or actor.own_pose is None:
         offer_files(
             state,
             "This figure has no skeleton: open it together with its .skel, or create one with "
@@ -109,7 +109,7 @@ def draw(state: AppState) -> None:
     if not imgui.begin_child("joints", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         imgui.end_child()
         return
-    _draw_figure_place(state, actor.pose)
+    _draw_figure_place(state, actor.own_pose)
     has_own = actor.figure.pose_layout is not None
     tree, moved = joint_tree(state), moved_joints(state)
     shown = joint_rows(skeleton, frozenset(tree.opened), tree.filter, has_own, moved)
@@ -126,15 +126,15 @@ def draw(state: AppState) -> None:
         indent = _INDENT * imgui.get_font_size() * min(depth, _DEEPEST)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
         if dof == _OWN_NUMBERS:
-            draw_own_numbers(state, actor.figure, actor.pose, joint)
+            draw_own_numbers(state, actor.figure, actor.own_pose, joint)
         elif dof == _TRANSLATION:
-            draw_translation(state, actor.pose, joint, labels[joint])
+            draw_translation(state, actor.own_pose, joint, labels[joint])
         elif dof == _SCALE:
-            draw_scale(state, actor.pose, joint, labels[joint])
+            draw_scale(state, actor.own_pose, joint, labels[joint])
         elif dof < 0:
             _draw_joint(state, joint, labels[joint])
         else:
-            _draw_dof(state, skeleton, actor.pose, dof, labels[joint])
+            _draw_dof(state, skeleton, actor.own_pose, dof, labels[joint])
     imgui.end_child()
 
 

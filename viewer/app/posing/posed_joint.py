@@ -81,7 +81,7 @@ def _axes(linear: Floats) -> Floats:
 
 def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoint | None:
     """Return a joint in an actor's pose or another one; None if there is no such joint."""
-    pose = actor.pose if pose is None else pose
+    pose = actor.own_pose if pose is None else pose
     if pose is None or joint < 0:
         return None
     if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:

@@ -165,8 +165,8 @@ def copy_pose(state: AppState) -> None:
     from viewer.formats.pose import pose_text
 
     actor = state.actor
-    if actor.pose is not None:
-        record = record_of(actor.figure, actor.pose, actor.shape_space.gender)
+    if actor.own_pose is not None:
+        record = record_of(actor.figure, actor.own_pose, actor.shape_space.gender)
         imgui.set_clipboard_text(pose_text(record))
         state.say_status("Pose copied as JSON")
 
@@ -174,9 +174,9 @@ def copy_pose(state: AppState) -> None:
 def copy_numbers(state: AppState) -> None:
     """Copy the pose to the clipboard as the model's raw pose vector."""
     actor = state.actor
-    if actor.pose is None or actor.figure.skeleton is None:
+    if actor.own_pose is None or actor.figure.skeleton is None:
         return
-    numbers = write_vector(actor.figure.pose_layout, actor.figure.skeleton, actor.pose)
+    numbers = write_vector(actor.figure.pose_layout, actor.figure.skeleton, actor.own_pose)
     imgui.set_clipboard_text(" ".join(f"{number!r}" for number in numbers.tolist()))
     state.say_status(f"Pose copied as {len(numbers)} numbers")
 
@@ -188,7 +188,7 @@ def paste_pose(state: AppState) -> None:
     from viewer.loading.additions import apply_pose
 
     actor = state.actor
-    if actor.pose is None:
+    if actor.own_pose is None:
         return
     text = imgui.get_clipboard_text() or ""
     # Numbers may be separated by commas, as in the list syntax of programming languages.
@@ -219,7 +219,7 @@ def save_pose(state: AppState, path: Path) -> None:
         options = ExportOptions(skinning=skinning)
         state.say(*export_pose(Selection([Part(actor)]), path, options)[1:])
 
-    if actor.pose is not None:
+    if actor.own_pose is not None:
         save_files(state, act, [path], _saved(actor))
 
 
@@ -255,16 +255,16 @@ def save_export(state: AppState, path: Path, options: ExportOptions | None = Non
 
 def _saved(actor: Actor) -> list[object]:
     """Return the present pose of an actor, to record that a file contains it."""
-    return [] if actor.pose is None else [SavedPose(actor, pose_key(actor.pose))]
+    return [] if actor.own_pose is None else [SavedPose(actor, pose_key(actor.own_pose))]
 
 
 def mirror(state: AppState) -> None:
     """Swap left and right in the chosen actor's pose."""
     actor = state.actor
-    if actor.pose is None:
+    if actor.own_pose is None:
         return
     try:
-        actor.pose = mirror_pose(actor.figure, actor.pose)
+        actor.pose = mirror_pose(actor.figure, actor.own_pose)
         state.say_status("Pose mirrored")
         pause_for_edit(state)
     except ViewerError as problem:
@@ -286,9 +286,9 @@ def reset_actor(state: AppState) -> None:
 
 def _reset(actor: Actor) -> bool:
     """Reset an actor to the pose of its file, and return whether it has one."""
-    if actor.figure.skeleton is None or actor.pose is None:
+    if actor.figure.skeleton is None or actor.own_pose is None:
         return False
-    actor.pose = pose_of_file(actor.figure, actor.pose)
+    actor.pose = pose_of_file(actor.figure, actor.own_pose)
     return True
 
 
@@ -305,7 +305,7 @@ def pose_of_file(figure: Figure, old: Pose) -> Pose:
 
 def reset_joint(state: AppState, joint: int) -> None:
     """Reset one joint of the chosen actor to the file's pose."""
-    pose, skeleton = state.actor.pose, state.actor.figure.skeleton
+    pose, skeleton = state.actor.own_pose, state.actor.figure.skeleton
     if pose is not None and skeleton is not None:
         dofs = np.flatnonzero(skeleton.dof_joints == joint)
         pose.dofs[dofs] = skeleton.rest_dofs[dofs]
@@ -320,9 +320,9 @@ def random_shape(state: AppState) -> None:
     posing = state.of(Posing)
     actor = state.actor
     shapes = actor.figure.blend_shapes
-    if shapes is None or actor.pose is None:
+    if shapes is None or actor.own_pose is None:
         return
-    weights = actor.pose.shape_weights.copy()
+    weights = actor.own_pose.shape_weights.copy()
     rows = [row for row, group in enumerate(shapes.groups) if group == "shape"]
     chosen = rows[:_RANDOM]
     weights[rows] = 0.0
@@ -332,13 +332,13 @@ def random_shape(state: AppState) -> None:
     else:
         low, high = shapes.ranges[chosen].T
         weights[chosen] = generator.uniform(low, high) - [shapes.origin(row) for row in chosen]
-    actor.pose.shape_weights = weights
+    actor.own_pose.shape_weights = weights
     state.say_status(f"Random shape, seed {posing.shape_seed}")
 
 
 def reset_shape(state: AppState) -> None:
     """Reset every shape coefficient of the chosen actor to the file's value."""
     actor = state.actor
-    if actor.pose is not None:
-        actor.pose.shape_weights = figure_pose(actor.figure).shape_weights
+    if actor.own_pose is not None:
+        actor.own_pose.shape_weights = figure_pose(actor.figure).shape_weights
         state.say_status("Shape reset")

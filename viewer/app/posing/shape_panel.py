@@ -48,7 +48,7 @@ _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
 def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
-    figure, pose = state.actor.figure, state.actor.pose
+    figure, pose = state.actor.figure, state.actor.own_pose
     if figure.blend_shapes is None or pose is None:
         offer_files(state, "This figure has no blend shapes: open a body model or a .morph file.")
         return
@@ -176,10 +176,10 @@ def drop_unreadable_shapes(state: AppState) -> None:
     """Set all shapes to 0 if blend shape offsets, which are read on first use, cannot be read."""
     try:
         for actor in state.scene.actors:
-            if actor.pose is not None:
-                shaped(actor.figure, actor.pose.shape_weights)
+            if actor.own_pose is not None:
+                shaped(actor.figure, actor.own_pose.shape_weights)
     except ViewerError as problem:
         state.error = str(problem)
         for actor in state.scene.actors:
-            if actor.pose is not None:
-                actor.pose.shape_weights = np.zeros(actor.figure.n_shapes)
+            if actor.own_pose is not None:
+                actor.own_pose.shape_weights = np.zeros(actor.figure.n_shapes)

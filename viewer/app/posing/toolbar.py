@@ -167,7 +167,7 @@ def cancel_drag(state: AppState) -> bool:
     if drag is None or drag.is_over:
         return False
     drag.is_over = True
-    if drag.actor.pose is drag.outcome.pose:
+    if drag.actor.own_pose is drag.outcome.pose:
         drag.actor.pose = drag.handle.start.copy()
         state.say_status("Drag cancelled")
     return True

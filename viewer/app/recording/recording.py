@@ -457,8 +457,8 @@ class RecordedMarks:
         pinned = self._pinned
         if pinned is not None and not self._binding:
             actor = scene.actors[pinned.actor]
-            if actor.pose is not None and actor.is_drawn:
-                why = explain_vertex(actor.figure, actor.pose, self._skinning, pinned.vertex)
+            if actor.own_pose is not None and actor.is_drawn:
+                why = explain_vertex(actor.figure, actor.own_pose, self._skinning, pinned.vertex)
                 found.append(vertex_annotation(why, actor, self._draws_lines, size))
         return found
 

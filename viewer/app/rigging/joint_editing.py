@@ -403,7 +403,7 @@ def _enter(state: AppState, actor: Actor, begun: _Begun) -> None:
         state.of(SavedWork).edited.add(figure)
         state.history.name = "find joints"
     if begun.place is not None:
-        actor.placement, actor.pose = begun.place, None
+        actor.placement, actor.own_pose = begun.place, None
     if begun.template is not None:
         editing.fit = actor, begun.template
     _show(actor, figure)
@@ -423,7 +423,7 @@ def _enter(state: AppState, actor: Actor, begun: _Begun) -> None:
 
 def _show(actor: Actor, figure: Figure) -> None:
     """Give an actor another figure, at rest; it keeps its place and shape."""
-    old, pose = actor.pose, figure_pose(figure)
+    old, pose = actor.own_pose, figure_pose(figure)
     if old is not None:
         pose.figure_scale = old.figure_scale
         pose.figure_translation = old.figure_translation.copy()
@@ -663,7 +663,7 @@ def _middle_under(state: AppState, actor: Actor, frame: ViewFrame, at: Place) ->
 
 def _figure_place(actor: Actor) -> Floats:
     """Return the matrix (4, 4) from figure space to the scene."""
-    return np.asarray(actor.placement @ placement_matrix(actor.require_pose()))
+    return np.asarray(actor.placement @ placement_matrix(actor.pose))
 
 
 def _scene_place(actor: Actor) -> Floats:
@@ -793,7 +793,7 @@ def update_joints(state: AppState) -> None:
     actor = editing.actor
     if actor is None:
         return
-    skeleton, pose = actor.figure.skeleton, actor.pose
+    skeleton, pose = actor.figure.skeleton, actor.own_pose
     is_there = any(actor is one for one in state.scene.actors)
     if not is_there or skeleton is None or pose is None or not actor.figure.is_attached:
         stop_editing(state)  # undone

@@ -29,7 +29,7 @@ _GAP = 1.25  # distance between target and template side by side, relative to th
 
 def target_place(actor: Actor) -> Floats:
     """Return the matrix that places an actor's mesh in the scene: (4, 4)."""
-    return actor.placement @ placement_matrix(actor.pose) if actor.pose else actor.placement
+    return actor.placement @ placement_matrix(actor.own_pose) if actor.own_pose else actor.placement
 
 
 def posed_template(view: Rigging, template: Template) -> Mesh:

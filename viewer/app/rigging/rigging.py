@@ -288,7 +288,7 @@ def target_mesh(state: AppState) -> Mesh:
     """Return the mesh of the target, which must exist, in its current pose."""
     target = state.of(Rigging).target
     assert target is not None  # checked by the callers
-    figure, pose = target.figure, target.pose
+    figure, pose = target.figure, target.own_pose
     if pose is None or figure.skin is None:
         return figure.require_mesh()
     # Placements are valid for one mesh, so the same pose must return the same object.
@@ -332,8 +332,8 @@ def current_template(state: AppState) -> Template | None:
     """Return the chosen template in its current pose; None if it has not been read yet."""
     view = state.of(Rigging)
     for actor in templates(state):
-        if _actor_key(actor) == view.template_key and actor.pose is not None:
-            return Template(view.template_key, actor.figure, actor.pose, actor.clip, actor)
+        if _actor_key(actor) == view.template_key and actor.own_pose is not None:
+            return Template(view.template_key, actor.figure, actor.own_pose, actor.clip, actor)
     read = view.template
     return read if read is not None and read.key == view.template_key else None
 
@@ -379,7 +379,6 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
         names = ", ".join(printable(path.name, 60) for path in paths)
         raise RigError(f"{names}: expected a rigged figure or a skeleton, found none")
     actor = found[0]
-    assert actor.pose is not None  # actors with skeletons have poses
     return Template(key, actor.figure, actor.pose, actor.clip, None, paths)
 
 

@@ -77,7 +77,7 @@ def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scal
 def joint_near(state: AppState, place: tuple[float, float]) -> int:
     """Return the chosen actor's visible joint near a window position, or -1."""
     posing, actor = state.of(Posing), state.actor
-    if actor.figure.skeleton is None or actor.pose is None or not actor.is_drawn:
+    if actor.figure.skeleton is None or actor.own_pose is None or not actor.is_drawn:
         return -1
     is_posed = posing.is_on and not no_tool(state)
     if not (is_posed or shows_skeleton(actor, state.options) or has_joint_marks(state.options)):

@@ -199,7 +199,7 @@ def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> F
     assert mesh is not None  # the figure has vertices
     if options.show == "binding":
         return mesh.positions[vertices]
-    return deform_vertices(actor.figure, actor.pose, options.skinning, vertices)[0]
+    return deform_vertices(actor.figure, actor.own_pose, options.skinning, vertices)[0]
 
 
 def _look_under_mouse(
@@ -231,7 +231,7 @@ def _look_under_mouse(
     if found is not None:
         index, vertex, triangle = found
         actor, options = state.scene.actors[index], state.options
-        facts = vertex_facts(actor.figure, actor.pose, options.skinning, vertex, triangle)
+        facts = vertex_facts(actor.figure, actor.own_pose, options.skinning, vertex, triangle)
         if options.show == "binding":
             mesh = actor.figure.require_mesh()
             facts = replace(facts, position=mesh.positions[vertex], normal=mesh.normals[vertex])

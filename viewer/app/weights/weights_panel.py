@@ -402,7 +402,7 @@ def explained(state: AppState) -> Explanation | None:
         unpin(state)  # the user has closed the panel
         return None
     is_there = pinned.actor < len(actors) and actors[pinned.actor].figure is pinned.figure
-    pose = actors[pinned.actor].pose if is_there else None
+    pose = actors[pinned.actor].own_pose if is_there else None
     if pose is None:
         unpin(state)
         return None

@@ -49,8 +49,7 @@ from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.kinematics import skinning_matrices, world_matrices, world_rotations
 from viewer.rigs.mesh import vertex_normals
-from viewer.rigs.pose import Pose, dof_rotations, joint_rotations, placement_matrix
-from viewer.rigs.posing.pose_vector import rotation_rows
+from viewer.rigs.pose import Pose, dof_rotations, joint_rotations, placement_matrix, rotation_rows
 from viewer.rigs.skeleton import Skeleton, clamp_dofs
 from viewer.rigs.skinning.lbs import move
 

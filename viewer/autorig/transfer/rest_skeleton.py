@@ -20,8 +20,14 @@ from viewer.rigs.geometry.rotation import (
 )
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.pose import Pose, dof_rotations, joint_rotations, rest_pose, zero_pose
-from viewer.rigs.posing.pose_vector import rotation_rows
+from viewer.rigs.pose import (
+    Pose,
+    dof_rotations,
+    joint_rotations,
+    rest_pose,
+    rotation_rows,
+    zero_pose,
+)
 from viewer.rigs.retargeting.mirror import joint_partners, mirror_axis
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
 

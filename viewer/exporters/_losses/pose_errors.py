@@ -107,7 +107,7 @@ def look_at_mesh(
     found = again.require_mesh()
     is_same = found.n_vertices == mesh.n_vertices
     if is_same:
-        losses.look(actor.pose, found.positions, frame=frame)
+        losses.look(actor.own_pose, found.positions, frame=frame)
     if is_same and np.array_equal(found.triangles, mesh.triangles):
         return []
     return [

@@ -76,7 +76,7 @@ def add_figure(
 ) -> Added:
     """Add a figure at rest with its clips, or in its current pose where ``clips`` is None."""
     figure = actor.figure
-    pose = actor.pose if clips is None else still_pose(actor)
+    pose = actor.own_pose if clips is None else still_pose(actor)
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
     if clips is not None:
         # The weights at rest, by the rules of expressions and 0 where missing, and a row that is

@@ -151,7 +151,7 @@ class _Shown:
     def points(self) -> Floats:
         """The points (N, 3) of these frames, scene space."""
         return np.concatenate(
-            [actor_points(replace(self.actor, pose=self.poses[frame])) for frame in self.seen]
+            [actor_points(replace(self.actor, own_pose=self.poses[frame])) for frame in self.seen]
         )
 
     def pack(self, how: Skinning, packer: Packer, notes: list[str]) -> tuple[Json, Floats]:
@@ -254,8 +254,8 @@ def _shown(part: Part, options: ExportOptions, first: float) -> _Shown:
             raise RigError(f"{what} of pages: expected none, as the scene is shown, found {value}")
     actor = part.actor
     if part.frames is None:
-        still = tracks_of(actor.figure, [actor.pose], options.skinning)
-        return _Shown(actor, [actor.pose], np.ones(1, np.bool_), 1.0, 0.0, still)
+        still = tracks_of(actor.figure, [actor.own_pose], options.skinning)
+        return _Shown(actor, [actor.own_pose], np.ones(1, np.bool_), 1.0, 0.0, still)
     animation = part.animation
     if options.gaps == "split":
         raise RigError('gaps of pages: expected hold or interpolate, found "split"')
@@ -341,7 +341,8 @@ def _poster(scene: Scene, shown: Sequence[_Shown]) -> str:
     from viewer.rendering.offscreen import render
 
     actors = [
-        replace(each.actor, pose=each.poses[0], is_present=bool(each.present[0])) for each in shown
+        replace(each.actor, own_pose=each.poses[0], is_present=bool(each.present[0]))
+        for each in shown
     ]
     try:
         pixels = render(

@@ -65,7 +65,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     bones = human_bones(figure)
     record = None if figure.record is None else figure.record.vrm
     notes = _left_out(actor)
-    still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    still = replace(actor, own_pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
     if record is not None:
         record, names = _repaired(record, bones)
         if names:
@@ -86,7 +86,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
             checked_meta(replace(given, authors=authors, licence=licence), figure.name)
     if record is not None and record.old_members is not None:
         figure, record = _facing_front(figure, record, bones)
-        still = replace(still, figure=figure, pose=figure_pose(figure))
+        still = replace(still, figure=figure, own_pose=figure_pose(figure))
         if lost := record.old_members:
             notes.append(
                 note(
@@ -102,9 +102,9 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         return gltf.write_poses(Selection([Part(still)]), path, options, extend) + notes
     added_meta = checked_meta(given, figure.name)
     pose = figure_pose(figure)
-    pose.shape_weights = actor.require_pose().shape_weights.copy()
+    pose.shape_weights = actor.pose.shape_weights.copy()
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
-    still = replace(still, figure=figure, pose=figure_pose(figure))
+    still = replace(still, figure=figure, own_pose=figure_pose(figure))
     if angle > _STRAIGHT:
         notes.append(
             note(
@@ -249,10 +249,10 @@ def _left_out(actor: Actor) -> list[Diagnostic]:
                 n=counted(n, "animation", "is", "are"),
             )
         )
-    elif actor.pose is not None:
+    elif actor.own_pose is not None:
         own = figure_pose(figure)
-        own.shape_weights = actor.pose.shape_weights
-        if pose_key(own) != pose_key(actor.pose):
+        own.shape_weights = actor.own_pose.shape_weights
+        if pose_key(own) != pose_key(actor.own_pose):
             notes.append(
                 Diagnostic(
                     "X003.vrm-pose: the current pose is omitted: VRM files store the rest pose"

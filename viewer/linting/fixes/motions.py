@@ -78,7 +78,7 @@ def _play(subject: Subject, index: int, old: _Motion, new: _Motion) -> None:
         actor.figure = replace(actor.figure, animations=tuple(animations))
     if actor.clip is not old:
         return
-    if isinstance(new, TransformClip) and actor.pose is not None:
+    if isinstance(new, TransformClip) and actor.own_pose is not None:
         # Joints without keys return to rest.
         play_animation(actor, actor.animation, new)
     actor.clip = new

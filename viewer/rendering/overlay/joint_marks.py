@@ -89,7 +89,7 @@ def joint_marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
     """Return the joints of all drawn actors that have a skeleton."""
     found = []
     for index, actor in enumerate(actors):
-        skeleton, pose = actor.figure.skeleton, actor.pose
+        skeleton, pose = actor.figure.skeleton, actor.own_pose
         if skeleton is None or pose is None or not actor.is_drawn:
             continue
         shape = shaped_skeleton(actor.figure, pose.shape_weights)

@@ -45,14 +45,14 @@ class MotionPathBuffers:
 
     def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:
         """Recompute the paths if clip, joints or the pose outside the clip have changed."""
-        has_pose = actor.joint_motion is not None and actor.pose is not None
+        has_pose = actor.joint_motion is not None and actor.own_pose is not None
         still = pose_key(still_pose(actor)) if has_pose else None
         key = (id(actor.clip), joints, min_confidence, actor.offset, still)
         if key == self._key or actor.clip is None:
             return
         self._clip = actor.clip  # a reference keeps the clip alive, so that its id is not reused
         path = motion_path(
-            actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
+            actor.figure, actor.clip, joints, base=actor.own_pose, min_confidence=min_confidence
         )
         self._upload(path, actor.offset)
         self._key = key

@@ -173,7 +173,7 @@ class OutlinePass:
             return
         if shows_mesh(actor.figure, options):
             mesh = self._buffers.posed_mesh(actor)
-            mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
+            mesh.update(None if options.show == "binding" else actor.own_pose, options.skinning)
 
             def prepare(program: moderngl.Program, _: MeshRun) -> None:
                 set_uniforms(program, {"u_mask": mask})

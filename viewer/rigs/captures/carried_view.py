@@ -27,11 +27,11 @@ def carrier_of(view: CameraView, actors: Sequence[Actor]) -> Actor | None:
 def view_in(view: CameraView, scene: Scene) -> CameraView:
     """Return a camera at the time of a scene and, if a joint carries it, in the scene's pose."""
     mount, actor = view.mount, carrier_of(view, scene.actors)
-    if mount is None or actor is None or actor.pose is None:
+    if mount is None or actor is None or actor.own_pose is None:
         return view_at(view, scene.time or 0.0)
     world = actor.placement
     if mount.joint >= 0:
-        joints = joint_matrices(actor.figure, actor.pose)
+        joints = joint_matrices(actor.figure, actor.own_pose)
         if mount.joint >= len(joints):
             return view
         world = world @ joints[mount.joint]
@@ -66,4 +66,4 @@ def _moved(path: CameraPath, actor: Actor, time: float) -> Floats:
     if animation is not None:
         nodes.clip, nodes.offset = animation.clip(), actor.offset
         pose_actors([nodes], time)
-    return np.asarray(world_matrices(path.nodes, nodes.require_pose())[-1])
+    return np.asarray(world_matrices(path.nodes, nodes.pose)[-1])

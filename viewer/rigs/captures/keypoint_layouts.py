@@ -240,7 +240,7 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
     """Return the body of the person to whom captured keypoints belong; None if untracked."""
     for actor in actors:
         same = actor.person == points.person and is_tracked(actor.person)
-        if same and actor.pose is not None and actor.figure.mesh is not None:
+        if same and actor.own_pose is not None and actor.figure.mesh is not None:
             return actor
     return None
 
@@ -248,11 +248,11 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
 def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
     """Return each visible keypoint's distance in scene units to its joint, regressed and posed."""
     layout, skeleton = points.figure.points, body.figure.skeleton
-    if layout is None or points.points is None or skeleton is None or body.pose is None:
+    if layout is None or points.points is None or skeleton is None or body.own_pose is None:
         return {}
     if not (points.is_present and body.is_present):
         return {}
-    joints = apply_transform(body.placement, joint_matrices(body.figure, body.pose)[:, :3, 3])
+    joints = apply_transform(body.placement, joint_matrices(body.figure, body.own_pose)[:, :3, 3])
     places = apply_transform(points.placement, points.points[:, :3])
     found = {}
     for index, name in matching_joints(layout).items():

@@ -339,7 +339,7 @@ class _Comparison:
     def _posed(self, actor: Actor) -> Floats:
         """Return the posed vertices in the unit of the first figure."""
         factor = self.factor if actor is self.second else 1.0
-        return factor * deform(actor.figure, actor.pose, self.skinning)[0]
+        return factor * deform(actor.figure, actor.own_pose, self.skinning)[0]
 
 
 class _Tally:
@@ -390,7 +390,7 @@ def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
 
 def _joint_frames(actor: Actor) -> Floats:
     """Return the joint matrices with the figure's own scale and translation: (J, 4, 4)."""
-    pose = actor.require_pose()
+    pose = actor.pose
     shape = shaped_skeleton(actor.figure, pose.shape_weights)
     return placement_matrix(pose) @ world_matrices(shape, pose)
 

@@ -58,11 +58,11 @@ class Steps:
                 pose_actors([actor], time)
             return f"frame {self.first_frame + number}"
         for actor, own in zip((first, second), self.own, strict=True):
-            actor.pose = None if own is None else own.copy()
+            actor.own_pose = None if own is None else own.copy()
         if number == 0:
             return "own pose"
-        first.require_pose().dofs[self.first] = self.dofs[number - 1]
-        second.require_pose().dofs[self.second] = self.dofs[number - 1]
+        first.pose.dofs[self.first] = self.dofs[number - 1]
+        second.pose.dofs[self.second] = self.dofs[number - 1]
         return f"test pose {number}"
 
 
@@ -81,7 +81,7 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
 def _own_pose(actor: Actor) -> Pose | None:
     """Return an actor's initial pose; a motion that the other actor lacks is ignored."""
     if actor.clip is None:
-        return None if actor.pose is None else actor.pose.copy()
+        return None if actor.own_pose is None else actor.own_pose.copy()
     return None if actor.figure.skeleton is None else figure_pose(actor.figure)
 
 

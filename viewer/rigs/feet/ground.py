@@ -93,7 +93,7 @@ def resting_height(actor: Actor, up: str) -> tuple[float, bool] | None:
         return None
     rate = motion.frame_rate
     times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]
-    frames = frames_of(figure, motion, times, actor.pose)
+    frames = frames_of(figure, motion, times, actor.own_pose)
     soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
     if soles is None or not frames.present.any():
         return None

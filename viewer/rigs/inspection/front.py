@@ -131,9 +131,9 @@ def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
         names = tuple(figure.points.names[point] for point in seen)
         roots = np.full(len(seen), -1, np.int32)
         return names, roots, apply_transform(actor.placement, actor.points[seen, :3])
-    if figure.skeleton is None or actor.pose is None or figure.skeleton.n_joints > _MOST_JOINTS:
+    if figure.skeleton is None or actor.own_pose is None or figure.skeleton.n_joints > _MOST_JOINTS:
         return nothing
-    joints = joint_matrices(figure, actor.pose)[:, :3, 3]
+    joints = joint_matrices(figure, actor.own_pose)[:, :3, 3]
     skeleton = figure.skeleton
     return (
         # Joint roles stated by the file are more certain than joint names.
@@ -157,7 +157,7 @@ def _path(actor: Actor) -> Floats:
     else:
         from viewer.rigs.motion.evaluation import frames_between, frames_of, world_frames
 
-        frames = frames_of(actor.figure, clip, times, actor.pose)
+        frames = frames_of(actor.figure, clip, times, actor.own_pose)
         frames = frames_between(frames, np.flatnonzero(frames.present))
         places = world_frames(actor.figure, frames)[..., :3, 3].mean(axis=1)
     return apply_transform(actor.placement, places.reshape(-1, 3))

@@ -103,12 +103,12 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
     chosen: TransformClip | None = None
     if index >= 0:
         chosen = clip or actor.figure.animations[index].clip()
-    if actor.pose is not None:
+    if actor.own_pose is not None:
         # The pose stored in the file with the current placement and shape.
         own = figure_pose(actor.figure)
-        own.figure_scale = actor.pose.figure_scale
-        own.figure_translation = actor.pose.figure_translation
-        weights = actor.pose.shape_weights.copy()
+        own.figure_scale = actor.own_pose.figure_scale
+        own.figure_translation = actor.own_pose.figure_translation
+        weights = actor.own_pose.shape_weights.copy()
         if actor.transforms is not None:
             for channel in actor.transforms.channels:
                 if channel.shapes is not None:

@@ -25,8 +25,7 @@ from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.samples import Samples, joint_samples
 from viewer.rigs.motion.transform_clip import TransformClip
-from viewer.rigs.pose import Pose, dof_rotations, joint_offsets, joint_rotations
-from viewer.rigs.posing.pose_vector import rotate_joints
+from viewer.rigs.pose import Pose, dof_rotations, joint_offsets, joint_rotations, rotate_joints
 from viewer.rigs.shape import joint_shifts, moved_rest_translations, rest_joints
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 

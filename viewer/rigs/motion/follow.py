@@ -18,8 +18,8 @@ def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
         seen = actor.points[:, 3] > 0.0
         chosen = seen & (np.arange(len(seen)) == joint) if joint >= 0 else seen
         points = actor.points[chosen, :3]
-    elif actor.pose is not None and actor.figure.skeleton is not None:
-        joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+    elif actor.own_pose is not None and actor.figure.skeleton is not None:
+        joints = joint_matrices(actor.figure, actor.own_pose)[:, :3, 3]
         points = joints[[joint]] if 0 <= joint < len(joints) else joints
     else:
         return None

@@ -101,7 +101,7 @@ def moving_mesh(actor: Actor, rate: float | None = None, bind: int | None = None
         raise RigError(f"{actor.name}: expected a mesh that moves, found no motion")
     rate = motion.frame_rate if rate is None else rate
     times = frame_times(motion.start, motion.end, rate)
-    frames = frames_of(figure, motion, times, actor.pose)
+    frames = frames_of(figure, motion, times, actor.own_pose)
     present = np.flatnonzero(frames.present)
     if not len(present):
         raise RigError(f"{actor.name}: expected a mesh that moves, found it in no frame")

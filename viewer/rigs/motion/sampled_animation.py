@@ -76,8 +76,8 @@ def sample_animation(
     if len(times) < stop - first:
         times = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if motion.timing is not None and rate == own else 0
-    sampled = frames_of(figure, motion, times, actor.pose, interpolate)
-    base = None if actor.pose is None else actor.pose.copy()
+    sampled = frames_of(figure, motion, times, actor.own_pose, interpolate)
+    base = None if actor.own_pose is None else actor.own_pose.copy()
     gender = actor.shape_space.gender or figure.shape_space.gender
     return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base, gender)
 
@@ -177,7 +177,7 @@ def single_frame(
 
     ``motion`` has it too: one key per DOF for rigs with keyed clips. RigError without joints.
     """
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no joints to pose")
     frames, skeleton = still_frames(figure, pose, actor.is_present, time), figure.skeleton

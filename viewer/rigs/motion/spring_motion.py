@@ -15,8 +15,7 @@ from viewer.rigs.geometry.vectors import axis_vector, unit
 from viewer.rigs.motion.evaluation import JointMotion, frames_of, rest_translations_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing, frame_times
-from viewer.rigs.pose import Pose, PoseKey, pose_key
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, PoseKey, pose_key, set_joint_rotations
 from viewer.rigs.scene import Actor, still_pose
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.springs.simulation import STEPS_PER_SECOND, PosedJoints, SpringTrack
@@ -44,7 +43,7 @@ class SpringMotion:
             return
         rotations = self.rotations(actor, np.array([time]))[0]
         matrices = quaternion_to_matrix(rotations)
-        pose = actor.require_pose()
+        pose = actor.pose
         set_joint_rotations(skeleton, pose, skeleton.springs.joints, matrices, "dofs")
 
     def rotations(self, actor: Actor, times: Floats) -> Floats:
@@ -98,8 +97,8 @@ def has_springs(actor: Actor) -> bool:
 def release_springs(actor: Actor) -> None:
     """Reset the spring joints of a pose to rest, in place, for instance to switch them off."""
     skeleton = actor.figure.skeleton
-    if skeleton is not None and skeleton.springs is not None and actor.pose is not None:
-        _rest(actor.figure, skeleton.springs, actor.pose)
+    if skeleton is not None and skeleton.springs is not None and actor.own_pose is not None:
+        _rest(actor.figure, skeleton.springs, actor.own_pose)
 
 
 def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
@@ -110,7 +109,7 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     if rate is None:
         rate = STEPS_PER_SECOND if clip.kind == "curves" else clip.frame_rate
     times = frame_times(clip.start, clip.end, rate)
-    frames = frames_of(actor.figure, clip, times, actor.pose)
+    frames = frames_of(actor.figure, clip, times, actor.own_pose)
     rotations = frames.rotations.copy()
     swings = actor.springs if isinstance(actor.springs, SpringMotion) else SpringMotion()
     rotations[:, skeleton.springs.joints] = swings.rotations(actor, times)

@@ -17,8 +17,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import Up, axis_vector
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
-from viewer.rigs.pose import Pose, joint_rotations, local_matrices
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, joint_rotations, local_matrices, set_joint_rotations
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.shape import shaped_skeleton
 
@@ -48,15 +47,15 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
-    pose = actor.pose
+    pose = actor.own_pose
     if hangs and pose is not None:
         pose = _rotated_upright(actor.figure, pose)
     points = actor.points
     if hangs and points is not None:
         points = points * np.append(_OVER, 1.0)  # confidences are unchanged
-    if figure is actor.figure and pose is actor.pose and points is actor.points:
+    if figure is actor.figure and pose is actor.own_pose and points is actor.points:
         return actor
-    return replace(actor, figure=figure, pose=pose, points=points)
+    return replace(actor, figure=figure, own_pose=pose, points=points)
 
 
 def upright_placement(scene: Scene, actor: Actor) -> Floats:

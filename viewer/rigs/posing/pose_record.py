@@ -18,8 +18,8 @@ from viewer.rigs.coefficients import apply_coefficients
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.hands import Hand, hand_vectors
-from viewer.rigs.pose import Pose
-from viewer.rigs.posing.pose_vector import read_vector, set_joint_rotations, write_vector
+from viewer.rigs.pose import Pose, set_joint_rotations
+from viewer.rigs.posing.pose_vector import read_vector, write_vector
 from viewer.rigs.retargeting.pose_transfer import (
     JointRotations,
     has_layout_of,

@@ -15,8 +15,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import reflected
 from viewer.rigs.kinematics import rest_world_rotations, world_rotations
 from viewer.rigs.mesh import bounding_box, box_size
-from viewer.rigs.pose import Pose, joint_rotations
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, joint_rotations, set_joint_rotations
 from viewer.rigs.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skeleton import Skeleton, clamp_dofs
