@@ -179,20 +179,16 @@ class Figure {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, values);
     };
-    if (held) {
-      const rest = this.split(held.rest?.values ?? this.rest, 3);
-      const normals = this.split(held.restNormals?.values ?? this.restNormals, 3);
-      if (!this.isAttached) return write(this.posed, this.rows(rest, normals));
-      write(this.positions, rest);
-      return write(this.normals, normals);
+    let rest = held?.rest?.values ?? this.rest, normals = held?.restNormals?.values ?? this.restNormals;
+    if (!held) {
+      const weights = fields ? tracks.at("weights") : [], n = this.data.motion.nShapes ?? 0;
+      rest = addOffsets(rest, weights, fields, 0, n);
+      if (tracks.isRecomputed) normals = surfaceNormals(rest, this.triangles, this.sources);
+      else if (normalFields)
+        normals = addOffsets(normals, tracks.at("normalWeights"), normalFields, 0);
+      rest = addOffsets(rest, weights, fields, n);
     }
-    const weights = fields ? tracks.at("weights") : [], n = this.data.motion.nShapes ?? 0;
-    let rest = addOffsets(this.rest, weights, fields, 0, n), normals = this.restNormals;
-    if (tracks.isRecomputed) normals = surfaceNormals(rest, this.triangles, this.sources);
-    else if (normalFields)
-      normals = addOffsets(normals, tracks.at("normalWeights"), normalFields, 0);
-    rest = this.split(addOffsets(rest, weights, fields, n), 3);
-    normals = this.split(normals, 3);
+    [rest, normals] = [this.split(rest, 3), this.split(normals, 3)];
     if (!this.isAttached) return write(this.posed, this.rows(rest, normals));
     write(this.positions, rest);
     write(this.normals, normals);
