@@ -9,11 +9,8 @@ function render({ model, el }) {
   frame.srcdoc = model.get("_page");
   const numbers = (view) => new Float64Array(
     view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
-  const mapped = (table, change) =>
-    Object.fromEntries(Object.entries(table).map(([key, value]) => [key, change(value)]));
-  const poses = () => mapped(model.get("_poses"), (arrays) => mapped(arrays, numbers));
   const names = ["time", "camera", "_selection"];
-  let known = {}, isReady = false;
+  let known = {}, isReady = false, posed = {};
   const send = (name, value) => {
     const message = { viewer: { [name.replace("_", "")]: value } };
     if (isReady) frame.contentWindow.postMessage(message, "*");
@@ -25,7 +22,18 @@ function render({ model, el }) {
     send(name, value);
   };
   for (const name of names) model.on(`change:${name}`, () => changed(name));
-  const pose = () => send("poses", poses());
+  // Sends the poses that were set since the last time.
+  const pose = () => {
+    if (!isReady) return;
+    const poses = {};
+    for (const [index, { number, values }] of Object.entries(model.get("_poses"))) {
+      if (posed[index] === number) continue;
+      posed[index] = number;
+      poses[index] = Object.fromEntries(
+        Object.entries(values).map(([name, array]) => [name, numbers(array)]));
+    }
+    send("poses", poses);
+  };
   model.on("change:_poses", pose);
   const receive = ({ source, data }) => {
     if (source !== frame.contentWindow || !data || !data.viewer) return;

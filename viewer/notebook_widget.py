@@ -48,6 +48,7 @@ class SceneWidget(anywidget.AnyWidget):
         for each in figures:
             self._shown.append(next(actor for actor in left if actor.name == each["name"]))
             left.remove(self._shown[-1])
+        self._unbent: list[dict[int, float]] = [{} for _ in self._shown]
         super().__init__(_page=page, height=height)
         self.observe(self._bend, names="_angles")
 
@@ -57,7 +58,10 @@ class SceneWidget(anywidget.AnyWidget):
 
     @property
     def selection(self) -> tuple[str, ...]:
-        """The names of the chosen actor and of the joint whose weights are shown, if any."""
+        """The names of the chosen actor and of the joint whose weights are shown, if any.
+
+        It may be set to the name of an actor, or to both.
+        """
         if not self._selection:
             return ()
         index, joint = self._selection
@@ -66,9 +70,14 @@ class SceneWidget(anywidget.AnyWidget):
         return self._shown[index].name, *bones
 
     @selection.setter
-    def selection(self, names: Sequence[str]) -> None:
+    def selection(self, names: str | Sequence[str]) -> None:
+        names = (names,) if isinstance(names, str) else names
         if not 1 <= len(names) <= 2:
-            raise ViewerError(f"selection: expected an actor and a joint, found {len(names)} names")
+            known = ", ".join(actor.name for actor in self._shown)
+            raise ViewerError(
+                f"selection: expected an actor ({known}), or an actor and a joint, "
+                f"found {len(names)} names"
+            )
         actor = self._scene[names[0]]
         joint = -1
         if len(names) == 2:
@@ -78,37 +87,44 @@ class SceneWidget(anywidget.AnyWidget):
     def _index(self, actor: Actor) -> int:
         """Return the number of an actor in the page."""
         if actor not in self._shown:
-            raise ViewerError(
-                f"{actor.name}: expected an actor of the page, found one that it does not show"
-            )
+            known = ", ".join(each.name for each in self._shown)
+            raise ViewerError(f"{actor.name}: expected an actor of the page ({known})")
         return self._shown.index(actor)
 
     def update(self) -> None:
         """Show the current poses of all actors, which may have been changed in place."""
-        found = {}
-        for index, actor in enumerate(self._shown):
-            if actor.pose is not None:
-                found[str(index)] = self._values(index, actor.pose)
-        self._poses = found
+        every = enumerate(self._shown)
+        self._show(*(index for index, actor in every if actor.own_pose is not None))
 
-    def _show(self, index: int) -> None:
-        pose = self._shown[index].pose
-        assert pose is not None  # it has just been set
-        self._poses = {**self._poses, str(index): self._values(index, pose)}
+    def _show(self, *indices: int) -> None:
+        """Show the poses of some actors."""
+        poses = dict(self._poses)
+        for index in indices:
+            self._unbent[index].clear()
+            # Numbered, as a trait that is set to an equal value is not sent: the page may have
+            # moved on from a pose that is shown again.
+            number = poses.get(str(index), {"number": 0})["number"] + 1
+            poses[str(index)] = {"number": number, "values": self._values(index)}
+        self._poses = poses
 
-    def _values(self, index: int, pose: Pose) -> dict[str, bytes]:
+    def _values(self, index: int) -> dict[str, bytes]:
         from viewer.exporters.html.motion import pose_values
 
         actor = self._shown[index]
-        values = pose_values(actor.figure, pose, self._skinning, self._centers[index])
+        values = pose_values(actor.figure, actor.pose, self._skinning, self._centers[index])
         return {name: np.asarray(array, "<f8").tobytes() for name, array in values.items()}
 
     def _bend(self, change: Mapping[str, Any]) -> None:
-        """Set the angles that sliders of the page have changed."""
-        for actor, pairs in zip(self._shown, change["new"], strict=False):
-            if actor.pose is not None:
-                for row, angle in pairs:
-                    actor.pose.dofs[row] = angle
+        """Set the angles that sliders of the page have changed, and restore those it has reset."""
+        for actor, before, pairs in zip(self._shown, self._unbent, change["new"], strict=False):
+            if actor.own_pose is None:
+                continue
+            dofs, bent = actor.pose.dofs, dict(pairs)
+            for row in before.keys() - bent.keys():
+                dofs[row] = before.pop(row)
+            for row, angle in bent.items():
+                before.setdefault(row, float(dofs[row]))
+                dofs[row] = angle
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         """Return the widget, and a picture for where widgets are not shown, as on GitHub."""
@@ -131,7 +147,7 @@ class ShownActor:
         return self._widget._shown[self._index]
 
     @property
-    def pose(self) -> Pose | None:
+    def pose(self) -> Pose:
         """The pose that is shown, with the joints that sliders have rotated."""
         return self.actor.pose
 

@@ -68,8 +68,12 @@ def test_page_shows_the_pose_that_it_is_told_until_the_time_changes(browser, tmp
 _HARNESS = """<!doctype html><title>harness</title><div id="cell"></div><script>
 const decoded = (text) => new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
 const state = STATE, listeners = {};
-for (const arrays of Object.values(state._poses))
-  for (const name of Object.keys(arrays)) arrays[name] = decoded(arrays[name]);
+const decodedPoses = (poses) => {
+  for (const { values } of Object.values(poses))
+    for (const name of Object.keys(values)) values[name] = decoded(values[name]);
+  return poses;
+};
+decodedPoses(state._poses);
 const model = {
   saves: 0,
   get: (name) => state[name],
@@ -90,14 +94,22 @@ const saved = (count) => new Promise((done) => {
 </script>"""
 
 
+def sent_poses(widget) -> dict:
+    """Return the poses of a widget as JSON; ``decodedPoses`` of the page reads them."""
+    return {
+        index: {
+            "number": pose["number"],
+            "values": {name: base64.b64encode(v).decode() for name, v in pose["values"].items()},
+        }
+        for index, pose in widget._poses.items()
+    }
+
+
 def harness(path: Path, widget) -> None:
     """Write a page that runs the widget's script with the widget's state, as a notebook does."""
     state = {name: getattr(widget, name) for name in ("height", "time", "camera", "_page")}
     state["_selection"] = list(widget._selection)
-    state["_poses"] = {
-        index: {name: base64.b64encode(data).decode() for name, data in arrays.items()}
-        for index, arrays in widget._poses.items()
-    }
+    state["_poses"] = sent_poses(widget)
     script = Path(viewer.__file__).with_name("notebook_widget.js").read_text("utf-8")
     parts = {"STATE": state, "SCRIPT": script}
     text = _HARNESS
@@ -134,7 +146,55 @@ def test_widget_and_page_keep_camera_selection_and_joints_equal(browser, tmp_pat
     assert browser.run("state.camera.azimuth") == -20.0
     widget.set_trait("_angles", [[[4, 0.75]]])
     assert actor.pose.dofs[4] == 0.75
+    # "Reset joints" in the page resets the kernel's pose, too.
+    widget.set_trait("_angles", [[]])
+    assert actor.pose.dofs[4] == 0.25
     assert browser.messages == []
+
+
+@needs_chromium
+def test_live_loop_ends_with_its_last_pose_and_an_equal_pose_is_shown_again(browser, tmp_path):
+    actor = posed()
+    widget, turned = viewer.widget(actor), actor.pose.copy()
+    turned.dofs[3:6] += 0.6
+    sent = []
+    for pose in (actor.pose.copy(), turned, turned):
+        widget["figure"].pose = pose
+        sent.append(json.dumps(sent_poses(widget)))
+    assert len({*sent}) == 3  # traits that are set to equal values are not sent
+    widget.camera = {"azimuth": 20.0}  # the page answers
+    harness(tmp_path / "a.html", widget)
+    browser.messages.clear()
+    browser.send("Page.navigate", url=(tmp_path / "a.html").as_uri())
+    browser.run("new Promise(done => document.readyState === 'complete' ? done() : onload = done)")
+    browser.run("begun.then(() => saved(1))")
+
+    def shown(script):
+        wait = "new Promise(done => setTimeout(done, 250))"
+        browser.run(f"Promise.resolve({script}).then(() => {wait})")
+        return browser.screenshot()
+
+    live = """new Promise(done => { let n = 0; const next = () => {
+        const { values } = decodedPoses(n % 2 ? LAST : FIRST)[0];
+        model.set("_poses", { 0: { number: 10 + n, values } });
+        n += 1;
+        if (n < 16) setTimeout(next, 33); else done();
+      }; next(); })"""
+    end = shown(live.replace("LAST", sent[2]).replace("FIRST", sent[0]))
+    released = shown("model.set('time', 1)")
+    again = f"model.set('_poses', {{ 0: {{ ...decodedPoses({sent[2]})[0], number: 99 }} }})"
+    assert shown(again) == end != released
+    assert browser.messages == []
+
+
+def test_slider_of_a_pose_that_is_replaced_is_forgotten():
+    actor = posed()
+    widget, other = viewer.widget(actor), actor.pose.copy()
+    widget.set_trait("_angles", [[[4, 0.75]]])
+    other.dofs[4] = 0.5
+    widget["figure"].pose = other
+    widget.set_trait("_angles", [[]])
+    assert actor.pose is other and other.dofs[4] == 0.5
 
 
 def test_widget_reads_back_what_the_page_has_chosen():
@@ -147,9 +207,13 @@ def test_widget_reads_back_what_the_page_has_chosen():
     assert widget.selection == ("figure", actor.figure.skeleton.names[1])
     with pytest.raises(viewer.ViewerError, match="no such joint"):
         widget.selection = "figure", "no such joint"
+    with pytest.raises(viewer.ViewerError, match=r"an actor \(figure\), .* found 0 names"):
+        widget.selection = ()
+    widget.selection = "figure"
+    assert widget.selection == ("figure",)
     widget["figure"][actor.figure.skeleton.names[1]] = [0.0, 0.5, 0.0]
     assert_allclose(actor[actor.figure.skeleton.names[1]], [0.0, 0.5, 0.0], atol=1e-12)
-    rotations = np.frombuffer(widget._poses["0"]["rotations"])
+    rotations = np.frombuffer(widget._poses["0"]["values"]["rotations"])
     assert rotations.shape == (24,) and np.isfinite(rotations).all()
     data, _ = widget._repr_mimebundle_()
     assert data["image/png"].startswith(b"\x89PNG")
