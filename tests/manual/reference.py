@@ -169,9 +169,8 @@ def json_keys(kind: str) -> str:
             wanted += [other for other in classes if re.search(rf"\b{other}\b", typed)
                        and other not in wanted]  # fmt: skip
             is_optional = typed.startswith("NotRequired[")
-            typed = typed[len("NotRequired[") : -1] if is_optional else typed
             key = f"`{ast.unparse(node.target)}`" + " (not always)" * is_optional
-            rows.append((key, _json_type(typed), text))
+            rows.append((key, _json_type(node.annotation), text))
         title = ast.get_docstring(classes[name]) or ""
         head = f"**{name.removesuffix('Data').lower()}**: {title[0].lower()}{title[1:]}\n\n"
         shown.append(head + table(("key", "value", "meaning"), rows))
@@ -184,18 +183,25 @@ _JSON = {
 }
 
 
-def _json_type(text: str) -> str:
+def _json_type(node: ast.expr) -> str:
     """Return an annotation in words: ``list[float] | None`` is "list of number, or null"."""
-    if " | " in text and not text.endswith("]]"):
-        return ", or ".join(map(_json_type, text.split(" | ")))
-    inner = re.fullmatch(r"(\w+)\[(.*)\]", text)
-    if inner is None:
-        return _JSON.get(text, text.removesuffix("Data").lower())
-    if inner[1] == "list":
-        return f"list of {_json_type(inner[2])}"
-    if inner[1] == "dict":
-        return f"object of {_json_type(inner[2].removeprefix('str, '))}"
-    return ", ".join(part.strip("'") for part in inner[2].split(", "))
+    if isinstance(node, ast.BinOp):
+        return f"{_json_type(node.left)}, or {_json_type(node.right)}"
+    if isinstance(node, ast.Constant):
+        return _JSON[str(node.value)] if node.value is None else str(node.value)
+    if isinstance(node, ast.Tuple):
+        return ", ".join(map(_json_type, node.elts))
+    if not isinstance(node, ast.Subscript):
+        name = ast.unparse(node)
+        return _JSON.get(name, name.removesuffix("Data").lower())
+    inner = node.slice
+    match ast.unparse(node.value):
+        case "list":
+            return f"list of {_json_type(inner).replace(', or ', ' or ')}"
+        case "dict" if isinstance(inner, ast.Tuple):
+            return f"object of {_json_type(inner.elts[1])}"
+        case _:
+            return _json_type(inner)
 
 
 TABLES = {
