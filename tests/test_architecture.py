@@ -54,7 +54,7 @@ PARTS = {
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts", "media", "resources"},
-    "plugin_template": {"formats", "rigs"},  # otherwise the names of ``viewer.__all__``
+    "plugin_template": {"formats", "linting", "rigs"},  # otherwise the names of ``viewer.__all__``
     "examples": {
         "batching",
         "models",

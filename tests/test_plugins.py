@@ -1,6 +1,8 @@
 """Plug-ins: the package that ``viewer new-plugin`` writes, installed and used, and broken ones."""
 
 import importlib
+import json
+import re
 import runpy
 import sys
 import tomllib
@@ -12,7 +14,9 @@ import pytest
 import viewer
 from viewer.cli import run
 from viewer.commands.doctor import examine
+from viewer.diagnostics import CODES
 from viewer.errors import PluginError
+from viewer.exporters import EXPORTERS
 from viewer.formats import FORMATS, all_suffixes
 from viewer.plugins import _installed, plugins_of, without_plugins
 from viewer.rigs import scalars
@@ -23,7 +27,8 @@ TRIANGLE = "OFF\n3 1 3\n0 0 0\n1 0 0\n0 2 0\n3 0 1 2\n"
 @pytest.fixture
 def install(tmp_path, monkeypatch):
     """Return a function that installs a package: a folder with its metadata counts as that."""
-    known, place = dict(scalars.SCALARS), tmp_path / "site"
+    tables, place = (scalars.SCALARS, EXPORTERS, CODES), tmp_path / "site"
+    known = [dict(table) for table in tables]
     place.mkdir()
     monkeypatch.syspath_prepend(place)
 
@@ -44,8 +49,9 @@ def install(tmp_path, monkeypatch):
             del sys.modules[name]
     _installed.cache_clear()
     scalars._PLUGGED.clear()
-    scalars.SCALARS.clear()
-    scalars.SCALARS.update(known)
+    for table, rows in zip(tables, known, strict=True):
+        table.clear()
+        table.update(rows)
 
 
 @pytest.fixture
@@ -72,11 +78,11 @@ def written(install, tmp_path, monkeypatch, capsys):
 def test_tests_of_a_new_plugin_pass(written, tmp_path):
     tests = runpy.run_path(str(written / "tests" / "test_plugin.py"))
     functions = [value for name, value in tests.items() if name.startswith("test_")]
-    assert len(functions) == 3
+    assert len(functions) == 4
     for number, function in enumerate(functions):
         folder = tmp_path / str(number)
         folder.mkdir()
-        function(folder)
+        function(*[folder] * function.__code__.co_argcount)
 
 
 def test_modules_are_imported_when_their_rows_are_used(written, capsys):
@@ -120,7 +126,7 @@ def test_switch_ignores_plugins(written, capsys):
 
 def test_doctor_lists_them(written, install):
     (broken, old, listed) = plugin_lines(install)
-    assert listed == ("ok", "viewer-off 0.1: formats off, scalars height")
+    assert listed == ("ok", "viewer-off 0.1: formats off, scalars height, checks budget")
     assert broken[0] == "missing" and broken[1].startswith("plug-in bad 2.0 (formats xyz): cannot")
     assert old == ("note", "bad 2.0: scalars area is not used: this program has its own")
 
@@ -143,7 +149,7 @@ def plugin_lines(install):
         ("import nothing_like_this", "cannot be imported: ModuleNotFoundError: No module named"),
         ("def read(source): return 1 / 0", "cannot read a.xyz: ZeroDivisionError: division by"),
         ("def read(source): return 3", "expected a Figure from read, found int"),
-        ("x = 1", "cannot read a.xyz: AttributeError: module 'bad_one' has no attribute 'read'"),
+        ("x = 1", "expected a module with read, found none"),
     ],
     ids=["import", "exception", "result", "function"],
 )
@@ -210,6 +216,189 @@ def test_error_of_a_command_is_one_line_with_its_package(text, message, install,
     assert run(["fail2"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"viewer: plug-in tools 0.1 (commands fail2): {message}")
+
+
+def test_overview_lists_commands_of_plugins(install, capsys):
+    install("tools%", [("commands", "tidy", "tool_nine"), ("commands", "info", "tool_nine")])
+    assert run(["--help"]) == 0
+    text = capsys.readouterr().out
+    listed = text[text.index("commands of plug-ins") :]
+    assert re.search(r"tidy +tools% 0\.1", listed) and "info" not in listed
+    assert "tool_nine" not in sys.modules
+    assert run(["--help", "--no-plugins"]) == 0
+    assert "tidy" not in capsys.readouterr().out
+
+
+EXPORTER = """
+import json
+from viewer.diagnostics import note
+from viewer.exporters import Exporter
+EXPORTER = Exporter("Vertex list", (".vl",), "vertices", "all else", {STORES}, needs="mesh")
+def export(selection, path, options):
+    places = selection.part.actor.vertices(time=0.0)
+    {WRITE}
+    return [note("PVL: {n} vertices", path, n=len(places))]
+"""
+
+
+WRITE = "path.write_text(json.dumps(places.tolist()))"
+
+
+def write_exporter(place, stores="frozenset({'pose'})", write=WRITE):
+    (place / "lists.py").write_text(EXPORTER.replace("{STORES}", stores).replace("{WRITE}", write))
+
+
+def test_exporter_of_a_plugin_writes_its_suffix(install, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_exporter(install("lists", [("exporters", "vl", "lists"), ("exporters", "glb", "lists")]))
+    actor = viewer.load("fox")[0]
+    viewer.export(actor, "a.glb")
+    assert Path("a.glb").read_bytes()[:4] == b"glTF" and "lists" not in sys.modules
+    notes = viewer.export(actor, "a.vl")
+    assert str(notes[0]).endswith("a.vl: 7561 vertices")
+    np.testing.assert_allclose(json.loads(Path("a.vl").read_text()), actor.vertices(0.0))
+    assert run(["convert", "fox", "-o", "b.vl"]) == 0 and Path("b.vl").stat().st_size
+    assert run(["convert", "fox", "-o", "c.vm"]) == 2
+    assert ", .vl" in capsys.readouterr().err
+    assert run(["convert", "fox", "-o", "c.vl", "--no-plugins"]) == 2
+    assert not Path("c.vl").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"write": "places[0, 9]"}, "cannot write a.vl: IndexError: "),
+        ({"write": "pass"}, "expected export to write a.vl and to return notes"),
+        ({"stores": "frozenset({'pose'}), joints='smpl'"}, "expected EXPORTER to be an Exporter"),
+    ],
+    ids=["exception", "nothing", "row"],
+)
+def test_error_of_an_exporter_names_its_package(changes, message, install, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_exporter(install("lists", [("exporters", "vl", "lists")]), **changes)
+    with pytest.raises(PluginError) as problem:
+        viewer.export(viewer.load("fox")[0], "a.vl")
+    assert str(problem.value).startswith(f"plug-in lists 0.1 (exporters vl): {message}")
+    assert not Path("a.vl").exists()
+
+
+CHECK = """
+from viewer.linting import Code
+CODES = {"{CODE}": Code("error", "a wrong name", "rename it")}
+def check(subject):
+    {BODY}
+    yield subject.found("{CODE}.here: {name} is no name", name=subject.actor.name)
+"""
+
+
+def install_check(install, name, code="PNAME", body="pass"):
+    Path("fox.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    place = install(name, [("checks", name, f"check_{name}")])
+    text = CHECK.replace("{CODE}", code).replace("{BODY}", body)
+    (place / f"check_{name}.py").write_text(text)
+
+
+def test_check_of_a_plugin_is_run_and_listed(install, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    install_check(install, "names")
+    assert run(["lint", "fox.obj"]) == 1
+    assert "fox is no name" in capsys.readouterr().out
+    assert (
+        run(["lint", "fox.obj", "--ignore", "PNAME"])
+        == run(["lint", "fox.obj", "--no-plugins"])
+        == 0
+    )
+    assert "is no name" not in capsys.readouterr().out
+    assert run(["lint", "--codes"]) == 0
+    assert re.search(r"PNAME +error +a wrong name: rename it", capsys.readouterr().out)
+    (row,) = [row for row in viewer.lint("fox.obj").to_dicts() if row["code"] == "PNAME"]
+    assert (row["severity"], row["message"]) == ("error", "fox is no name")
+
+
+@pytest.mark.parametrize(
+    ("code", "body", "message"),
+    [
+        ("W001", "pass", 'expected codes of "P" and other capitals'),
+        ("PNAME2", "1 / 0", "failed: ZeroDivisionError"),
+        ("PNAME3", "yield 3", "expected findings of its own codes, found 3"),
+    ],
+    ids=["taken", "exception", "result"],
+)
+def test_error_of_a_check_names_its_package(code, body, message, install, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    install_check(install, "names", code, body)
+    with pytest.raises(PluginError) as problem:
+        viewer.lint("fox.obj")
+    assert str(problem.value).startswith(f"plug-in names 0.1 (checks names): {message}")
+
+
+TOOL = """
+import numpy as np
+from viewer.formats.video_mocap.numbers import rows
+from viewer.formats.video_mocap.results import Results, Track
+from viewer.rigs.bodies.smpl_family import FAMILY
+def recognises(archive):
+    return archive.has("my_turns")
+def read(source, archive):
+    turns = rows(archive, "my_turns", (None, 72)).reshape(-1, 24, 3)
+    track = Track(np.arange(len(turns)), FAMILY[24].names, turns, np.zeros((len(turns), 3)))
+    return RESULTS
+"""
+
+
+def test_tool_of_a_plugin_reads_its_results(install, tmp_path):
+    place = install("mine", [("tools", "mine", "tool_mine"), ("tools", "romp", "tool_mine")])
+    results = 'Results("Mine", "SMPL", {"world": {7: track}}, {"world": "y"}, frame_rate=50.0)'
+    (place / "tool_mine.py").write_text(TOOL.replace("RESULTS", results))
+    turns = np.zeros((5, 72))
+    turns[:, 3 * 16 + 2] = np.linspace(0.0, 1.0, 5)  # joint 16 of SMPL is the left shoulder
+    np.savez(tmp_path / "a.npz", my_turns=turns)
+    actor = viewer.load(tmp_path / "a.npz", model="body")[0]
+    assert actor.person == 7 and actor.vertices().shape[0] == 5
+    np.testing.assert_allclose(actor.at(0.08).pose["left_shoulder"], [0, 0, 1], atol=1e-6)
+    with without_plugins(), pytest.raises(viewer.ViewerError):
+        viewer.load(tmp_path / "a.npz")
+
+
+def test_wrong_results_of_a_tool_are_refused(install, tmp_path):
+    (install("mine", [("tools", "mine", "tool_bad")]) / "tool_bad.py").write_text(
+        TOOL.replace("RESULTS", "3")
+    )
+    np.savez(tmp_path / "a.npz", my_turns=np.zeros((5, 72)))
+    with pytest.raises(PluginError, match=r"mine 0.1 \(tools mine\): expected Results from read"):
+        viewer.load(tmp_path / "a.npz")
+
+
+def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install):
+    from app.driver import Driver
+
+    from viewer.app.layout import is_open, set_open
+
+    place = install("mine", [("panels", "notes", "panel_notes"), ("panels", "bad", "panel_bad")])
+    (place / "panel_notes.py").write_text(
+        "from imgui_bundle import imgui\n"
+        "texts = []\n"
+        "def draw(state):\n"
+        "    imgui.text(state.actor.name); texts.append(state.actor.name)\n"
+    )
+    (place / "panel_bad.py").write_text(
+        "from imgui_bundle import imgui\n"
+        "def draw(state):\n    imgui.begin_child('x', (0, 0)); imgui.tree_push('y'); 1 / 0\n"
+    )
+    hand = Driver("fox")
+    try:
+        assert "panel_notes" not in sys.modules and not is_open(hand.state, "notes")
+        hand.menu("menu Window", "notes (mine 0.1)")
+        hand.step(3)
+        assert sys.modules["panel_notes"].texts[-1] == "fox"
+        set_open(hand.state, "bad", True)
+        hand.step(3)
+        assert "plug-in mine 0.1 (panels bad): cannot be drawn: ZeroDivision" in hand.state.error
+        assert not is_open(hand.state, "bad")
+        hand.state.error = ""
+        hand.step(2)
+    finally:
+        hand.close()
 
 
 def test_commands_may_exit(install):

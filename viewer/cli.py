@@ -22,7 +22,7 @@ from viewer.commands._usage import (
 from viewer.errors import FormatError, ViewerError
 from viewer.interrupts import Interrupted, deferred, watched
 from viewer.phrases import printable
-from viewer.plugins import without_plugins
+from viewer.plugins import added_to, without_plugins
 from viewer.streams import standard_streams
 
 _EPILOG = """\
@@ -79,17 +79,17 @@ def _attempt(arguments: list[str]) -> int:
 
 
 def _dispatch(arguments: list[str]) -> int:
+    own = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    if "--no-plugins" in own:
+        arguments.remove("--no-plugins")
+        with without_plugins():
+            return _dispatch(arguments)
     if arguments and arguments[0] in ("-h", "--help"):
         _overview().print_help()
         return 0
     if arguments and arguments[0] == "--version":
         print(f"viewer {viewer.__version__}")
         return 0
-    own = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    if "--no-plugins" in own:
-        arguments.remove("--no-plugins")
-        with without_plugins():
-            return _dispatch(arguments)
     name = "view"
     if (arguments and arguments[0] in COMMANDS) or (arguments and is_plugged_command(arguments[0])):
         name = arguments.pop(0)
@@ -145,6 +145,13 @@ def _overview() -> argparse.ArgumentParser:
     for name, text in COMMANDS.items():
         # Commands are added like arguments, so that argparse aligns them.
         group.add_argument(name, nargs="?", help=text, metavar=name)
+    plugged = added_to("commands", COMMANDS)
+    if plugged:
+        group = parser.add_argument_group("commands of plug-ins")
+        for plugin in plugged:
+            shown = printable(plugin.name, 60)
+            text = plugin.distribution.replace("%", "%%")
+            group.add_argument(shown, nargs="?", help=text, metavar=shown)
     return parser
 
 

@@ -8,17 +8,15 @@ A package states them in its ``pyproject.toml``; the name of an entry point is t
     [project.entry-points."viewer.scalars"]
     height = "viewer_off.heights:HEIGHT"     # a viewer.rigs.scalars.Scalar
 
-    [project.entry-points."viewer.commands"]
-    tidy = "viewer_off.tidy"                 # a module with add_arguments(parser), run(arguments)
-
-Entry points are looked up only if a registry lacks a key, so programs without plug-ins start as
-fast, and rows of this program cannot be replaced. A module is imported when its row is used. Any
-exception of a plug-in becomes an error of one line that names its distribution.
+``viewer help plugins`` lists all groups. Entry points are looked up only if a registry lacks a key,
+so programs without plug-ins start as fast, and rows of this program cannot be replaced. A module is
+imported when its row is used. Any exception of a plug-in becomes an error of one line that names
+its distribution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal, TypeAlias, get_args
@@ -27,9 +25,22 @@ from viewer.data_classes import dataclass
 from viewer.errors import PluginError, ViewerError
 from viewer.phrases import printable
 
-Group: TypeAlias = Literal["formats", "scalars", "commands"]
+Group: TypeAlias = Literal[
+    "formats", "exporters", "scalars", "checks", "commands", "panels", "tools"
+]
 
 GROUPS: tuple[Group, ...] = get_args(Group)
+
+_PARTS: dict[Group, tuple[str, ...]] = {
+    "formats": ("read",),
+    "exporters": ("EXPORTER", "export"),
+    "scalars": (),
+    "checks": ("CODES", "check"),
+    "commands": ("add_arguments", "run"),
+    "panels": ("draw",),
+    "tools": ("recognises", "read"),
+}
+"""What the module of an entry point must have."""
 
 _is_enabled = True
 
@@ -48,14 +59,18 @@ class Plugin:
     """Name and version of the installed package."""
 
     def load(self) -> Any:
-        """Import the module, and return what the entry point names."""
+        """Import the module, and return what the entry point names, with all that it must have."""
         from importlib import import_module
         from operator import attrgetter
 
         module, _, name = self.target.partition(":")
         with self.guarded("cannot be imported"):
             found = import_module(module)
-            return attrgetter(name)(found) if name else found
+            found = attrgetter(name)(found) if name else found
+        missing = [part for part in _PARTS[self.group] if not hasattr(found, part)]
+        if missing:
+            raise self.error(f"expected a module with {' and '.join(missing)}, found none")
+        return found
 
     @contextmanager
     def guarded(self, what: str, may_exit: bool = False) -> Iterator[None]:
@@ -78,6 +93,11 @@ class Plugin:
 def plugin_of(group: Group, name: str) -> Plugin | None:
     """Return the plug-in with a key, if plug-ins are enabled and one has it."""
     return next((found for found in plugins_of(group) if found.name == name), None)
+
+
+def added_to(group: Group, own: Collection[str]) -> tuple[Plugin, ...]:
+    """Return the plug-ins of a registry that are used: those whose keys are not its own."""
+    return tuple(found for found in plugins_of(group) if found.name not in own)
 
 
 def plugins_of(group: Group) -> tuple[Plugin, ...]:
@@ -108,7 +128,8 @@ def _installed(group: Group) -> tuple[Plugin, ...]:
     found: dict[str, Plugin] = {}
     for each in sorted(entry_points(group=f"viewer.{group}"), key=lambda each: each.name):
         # A suffix is also written as ".off" or "OFF".
-        name = each.name.lower().removeprefix(".") if group == "formats" else each.name
+        is_suffix = group in ("formats", "exporters")
+        name = each.name.lower().removeprefix(".") if is_suffix else each.name
         package = "of an unknown package"
         if each.dist is not None:
             package = f"{each.dist.metadata['Name']} {each.dist.version}"

@@ -23,7 +23,7 @@ from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import key_name
 from viewer.app.files.files import ask_for_files, open_bundled_body, open_bundled_figure
 from viewer.app.keys import cancel, toggle_keys, toggle_messages, toggle_panels, want_screenshot
-from viewer.app.layout import PANELS, reset_layout, show_panel
+from viewer.app.layout import all_panels, reset_layout, show_panel
 from viewer.app.menus import CHECK, EXPORTS, NEW_CLIP
 from viewer.app.palette import Entry, toggle_palette
 from viewer.app.playback.animations import choose_animation, step_animation
@@ -198,7 +198,7 @@ def _actions(state: AppState) -> Iterator[Entry]:
 
 
 def _panels(state: AppState) -> Iterator[Entry]:
-    for name, panel in PANELS.items():
+    for name, panel in all_panels().items():
         why = no_panel(state, panel.needs)
         yield Entry(panel.title, "panel", partial(_open_panel, name=name), why=why)
 

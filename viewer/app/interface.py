@@ -18,15 +18,15 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.features import KEYS
 from viewer.app.layout import (
-    PANELS,
     Layout,
     Panel,
     ShownPanels,
+    all_panels,
     bring_to_front,
     draw_dock,
+    draw_panel,
     is_open,
     keep_fronts,
-    panel_module,
     set_open,
 )
 from viewer.app.manual import draw_manual
@@ -46,7 +46,7 @@ def draw_interface(state: AppState) -> None:
         draw_menus(state)
         dock = draw_dock(state)
         leading = ""
-        for name, panel in PANELS.items():
+        for name, panel in all_panels().items():
             if is_open(state, name) and not no_panel(state, panel.needs):
                 appears = _draw_panel(state, name, panel)
                 leading = panel.title if appears and panel.leads else leading
@@ -75,7 +75,7 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     # A panel that appears together with a figure must not cover other panels.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
-    for other in PANELS.values():
+    for other in all_panels().values():
         if other.place != panel.place or other is panel:
             continue
         window = imgui.internal.find_window_by_name(other.title)
@@ -86,7 +86,7 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()
     if shown:
-        panel_module(name).draw(state)
+        draw_panel(state, name)
     imgui.end()
     if not stays:
         set_open(state, name, False)

@@ -15,6 +15,8 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
+from viewer.errors import ViewerError
+from viewer.plugins import added_to, plugin_of
 
 _DOCK = "viewer dock"
 # Minimum and maximum width of each side, in font sizes.
@@ -72,9 +74,41 @@ PANELS = {
 """Panels in the order in which they are docked and listed in the menu."""
 
 
+def all_panels() -> dict[str, Panel]:
+    """Return ``PANELS`` with those of plug-ins, which are closed until the user opens them."""
+    found = dict(PANELS)
+    for plugin in added_to("panels", PANELS):
+        title = f"{plugin.name} ({plugin.distribution})"
+        found[plugin.name] = Panel("", title, "right 3", on_demand=True)
+    return found
+
+
 def panel_module(name: str) -> ModuleType:
     """Return a panel's module, imported on first use."""
     return import_module(f"viewer.app.{PANELS[name].feature}.{name}_panel")
+
+
+def draw_panel(state: AppState, name: str) -> None:
+    """Draw the contents of a panel; one of a plug-in that fails is closed, with its error."""
+    if name in PANELS:
+        panel_module(name).draw(state)
+        return
+    plugin = plugin_of("panels", name)
+    assert plugin is not None  # as ``all_panels`` has found it
+    before = imgui.internal.ErrorRecoveryState()
+    imgui.internal.error_recovery_store_state(before)
+    try:
+        module = plugin.load()
+        with plugin.guarded("cannot be drawn"):
+            module.draw(state)
+    except ViewerError as problem:
+        # ImGui ends what the panel has begun; it would report each as an error.
+        settings = imgui.get_io()
+        settings.config_error_recovery_enable_assert = False
+        imgui.internal.error_recovery_try_to_recover_state(before)
+        settings.config_error_recovery_enable_assert = True
+        set_open(state, name, False)
+        state.error = str(problem)
 
 
 @dataclass(slots=True)
@@ -122,7 +156,7 @@ class Layout:
 def is_open(state: AppState, name: str) -> bool:
     """Return whether a panel is open; it is drawn only if it has something to show."""
     shown = state.of(ShownPanels)
-    if PANELS[name].on_demand:
+    if all_panels()[name].on_demand:
         return name in shown.opened
     return name not in shown.closed
 
@@ -130,7 +164,7 @@ def is_open(state: AppState, name: str) -> bool:
 def set_open(state: AppState, name: str, opened: bool) -> None:
     """Open or close a panel."""
     shown = state.of(ShownPanels)
-    on_demand = PANELS[name].on_demand
+    on_demand = all_panels()[name].on_demand
     names = shown.opened if on_demand else shown.closed
     if opened == on_demand:
         names.add(name)
@@ -141,7 +175,7 @@ def set_open(state: AppState, name: str, opened: bool) -> None:
 def show_panel(state: AppState, name: str) -> None:
     """Open a panel, and bring it to the front of its tabs once it is drawn."""
     set_open(state, name, True)
-    state.of(ShownPanels).fronts.append(PANELS[name].title)
+    state.of(ShownPanels).fronts.append(all_panels()[name].title)
 
 
 def reset_layout(state: AppState) -> None:
@@ -244,7 +278,7 @@ def _build(layout: Layout, dock: int, sizes: _Sizes) -> None:
     fraction = sizes.right / (width - sizes.left)
     nodes["right"] = builder.dock_builder_split_node(rest, imgui.Dir.right, fraction).id_at_dir
     places = nodes | _rows(nodes["right"], sizes)
-    for panel in PANELS.values():
+    for panel in all_panels().values():
         builder.dock_builder_dock_window(panel.title, places[panel.place])
     builder.dock_builder_finish(dock)
     layout.nodes, layout.sizes, layout.found = nodes, sizes, ()
@@ -315,5 +349,5 @@ def _resize(layout: Layout, sizes: _Sizes) -> None:
 
 def _docked() -> list[str]:
     """Return the titles of panels that have been drawn."""
-    titles = [panel.title for panel in PANELS.values()]
+    titles = [panel.title for panel in all_panels().values()]
     return [title for title in titles if imgui.internal.find_window_by_name(title) is not None]

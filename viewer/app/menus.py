@@ -31,7 +31,7 @@ from viewer.app.files.files import (
 from viewer.app.files.model_menu import draw_model_menu
 from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.keys import Keyboard, want_screenshot
-from viewer.app.layout import PANELS, is_open, reset_layout, toggle_panel
+from viewer.app.layout import all_panels, is_open, reset_layout, toggle_panel
 from viewer.app.linting.lint_panel import check_rig
 from viewer.app.manual import draw_manual_menu
 from viewer.app.palette import toggle_palette
@@ -69,7 +69,7 @@ def draw_menus(state: AppState) -> None:
         imgui.end_menu()
     draw_view_menu(state)
     if begin_menu(state, "Window"):
-        for name, panel in PANELS.items():
+        for name, panel in all_panels().items():
             why = no_panel(state, panel.needs)
             if menu_item(state, panel.title, "", is_open(state, name), why):
                 toggle_panel(state, name)

@@ -109,10 +109,7 @@ def command_module(name: str) -> Any:
         return import_module(f"viewer.commands.{name.replace('-', '_')}")
     plugin = plugin_of("commands", name)
     assert plugin is not None  # as ``is_plugged_command`` has found it
-    module = plugin.load()
-    if not (hasattr(module, "run") and hasattr(module, "add_arguments")):
-        raise plugin.error("expected the functions add_arguments and run")
-    return module
+    return plugin.load()
 
 
 def guard_of(name: str) -> AbstractContextManager[None]:

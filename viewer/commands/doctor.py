@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -24,7 +24,7 @@ from viewer.commands._printing import print_line
 from viewer.data_classes import dataclass
 from viewer.errors import PluginError, RenderError
 from viewer.phrases import counted, printable
-from viewer.plugins import GROUPS, plugins_of
+from viewer.plugins import GROUPS, Group, plugins_of
 
 if TYPE_CHECKING:
     from viewer.rendering.offscreen import Offscreen
@@ -137,14 +137,6 @@ def _examine_packages() -> Iterator[_Finding]:
 
 def _examine_plugins() -> Iterator[_Finding]:
     """List plug-ins by package; each is imported, to see that it can be used."""
-    from viewer.formats import SUFFIXES
-    from viewer.rigs.scalars import SCALARS
-
-    own = {
-        "formats": {suffix[1:] for suffix in SUFFIXES},
-        "scalars": {*SCALARS},
-        "commands": {*COMMANDS},
-    }
     found: dict[str, list[str]] = {}
     for plugin in (each for group in GROUPS for each in plugins_of(group)):
         try:
@@ -152,13 +144,37 @@ def _examine_plugins() -> Iterator[_Finding]:
         except PluginError as problem:
             yield _Finding("plug-in", "missing", str(problem))
             continue
-        if plugin.name in own[plugin.group]:
+        if plugin.name in _own_keys(plugin.group):
             unused = f"{plugin.distribution}: {plugin.group} {plugin.name} is not used"
             yield _Finding("plug-in", "note", f"{unused}: this program has its own")
             continue
         found.setdefault(plugin.distribution, []).append(f"{plugin.group} {plugin.name}")
     for package, rows in found.items():
         yield _Finding("plug-in", "ok", f"{package}: {', '.join(rows)}")
+
+
+def _own_keys(group: Group) -> Collection[str]:
+    """Return the keys of this program in a registry, which no plug-in replaces."""
+    from viewer.exporters import EXPORTERS
+    from viewer.formats import SUFFIXES
+    from viewer.formats.video_mocap.tools import TOOLS
+    from viewer.linting import CHECKS
+    from viewer.rigs.scalars import SCALARS
+
+    if group == "panels":
+        from viewer.app.layout import PANELS
+
+        return PANELS
+    written = [EXPORTERS[key].suffixes for key in EXPORTERS if key[0] != "."]
+    keys: dict[str, Collection[str]] = {
+        "formats": {suffix[1:] for suffix in SUFFIXES},
+        "exporters": {suffix[1:] for suffixes in written for suffix in suffixes},
+        "scalars": SCALARS,
+        "checks": CHECKS,
+        "commands": COMMANDS,
+        "tools": TOOLS,
+    }
+    return keys[group]
 
 
 def _examine_extras() -> Iterator[_Finding]:

@@ -21,12 +21,12 @@ from viewer.diagnostics.codes import codes_in
 from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
 from viewer.linting import (
-    CODES,
     SEVERITIES,
     Finding,
     LintOptions,
     describe,
     finding_text,
+    known_codes,
     lint_files,
     recheck,
     summary,
@@ -79,7 +79,10 @@ def _add_check_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the findings, worst first; return 1 if any is as severe as ``--fail-on``."""
     if arguments.codes:
-        rows = [[name, code.severity, f"{code.title}: {code.hint}"] for name, code in CODES.items()]
+        rows = [
+            [name, code.severity, f"{code.title}: {code.hint}"]
+            for name, code in known_codes().items()
+        ]
         print("\n".join(table_lines(rows)))
         return 0
     require_files(arguments.files, arguments.body, "lint")
@@ -208,9 +211,10 @@ def _checked(arguments: argparse.Namespace) -> Findings:
 
 def _ignored(arguments: argparse.Namespace) -> set[str]:
     ignored = set(codes_in(arguments.ignore))
-    unknown = sorted(ignored - CODES.keys())
+    known = known_codes() if ignored else {}
+    unknown = sorted(ignored - known.keys())
     if unknown:
-        hint = did_you_mean(unknown[0], CODES) or "viewer lint --codes lists them"
+        hint = did_you_mean(unknown[0], known) or "viewer lint --codes lists them"
         raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
     return ignored
 

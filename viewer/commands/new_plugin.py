@@ -1,4 +1,4 @@
-"""A new package with a plug-in: a format, a scalar quantity and their tests, to start from."""
+"""A new package with a plug-in: a format, a quantity, a check and their tests, to start from."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ _FILES = {
     "{module}/__init__.py": None,
     "{module}/off.py": "off.py",
     "{module}/scalars.py": "scalars.py",
+    "{module}/checks.py": "checks.py",
     "tests/test_plugin.py": "tests.txt",
 }
 """Files of the package, and those of ``plugin_template`` that they are made of."""
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         except OSError as problem:
             raise OutputError(f"{printable(path, 300)}: {problem.strerror or problem}") from None
         save_text(path, text)
-    print(f"{printable(folder)}: a plug-in that reads .off and shows heights (--scalar height)")
+    print(f"{printable(folder)}: a plug-in that reads .off, shows heights and checks meshes")
     print(f"  pip install -e {printable(folder)}      # viewer doctor lists it")
     print(f"  pytest {printable(folder)}")
     return 0

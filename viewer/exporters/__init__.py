@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
-from viewer.errors import RigError, UnsupportedFormatError
+from viewer.errors import PluginError, RigError, UnsupportedFormatError
 from viewer.exporters._exporter import FOLDER, Content, Exporter, Part, SampledParts, Selection
 from viewer.exporters._left_out import motion_notes
 from viewer.exporters._motion_paths import files_at, is_together, part_files, part_paths
@@ -17,6 +18,7 @@ from viewer.exporters._options import ExportOptions, PageOptions, VrmMeta
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import all_of, counted, printable
+from viewer.plugins import plugin_of, plugins_of
 from viewer.rigs.bodies.smpl_family import member_of
 from viewer.rigs.captures.person import is_tracked, person_label
 from viewer.rigs.captures.sampled_points import sample_upright_points
@@ -45,6 +47,7 @@ __all__ = [
     "output_files",
     "sampled",
     "suited_exporter",
+    "usable_exporters",
 ]
 
 
@@ -184,18 +187,59 @@ EXPORTERS = {
         keeps_world=True,
     ),
 }
-"""Modules in this folder; ``Exporter`` describes what they have."""
+"""Modules in this folder; ``Exporter`` describes what they have. Rows of plug-ins are added, with
+their suffix as the key, when a file with that suffix is to be written."""
+_OWN = frozenset(EXPORTERS)
+
+
+def usable_exporters() -> list[Exporter]:
+    """Return all exporters for menus; ``viewer doctor`` says which plug-ins cannot be used."""
+    for plugin in plugins_of("exporters"):
+        with suppress(PluginError):
+            _find_plugin(f".{plugin.name}")
+    return [*EXPORTERS.values()]
+
+
+def _find_plugin(suffix: str) -> None:
+    """Add the row of a plug-in to ``EXPORTERS`` if none of this program writes a suffix."""
+    if any(suffix in EXPORTERS[key].suffixes for key in _OWN):
+        return
+    plugin = plugin_of("exporters", suffix[1:])
+    if plugin is None:
+        EXPORTERS.pop(suffix, None)  # plug-ins have been switched off since
+        return
+    row = plugin.load().EXPORTER
+    if not isinstance(row, Exporter) or row.suffixes != (suffix,) or row.joints:
+        wanted = f'expected EXPORTER to be an Exporter of ("{suffix}",), of any joints'
+        raise plugin.error(f"{wanted}, found {row!r:.80}")
+    EXPORTERS[suffix] = row
+
+
+def _write(key: str, selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write files with an exporter, and return its notes."""
+    if key in _OWN:
+        module = import_module(f"{__name__}.{key}")
+        return list[Diagnostic](module.export(selection, path, options))
+    plugin = plugin_of("exporters", key[1:])
+    assert plugin is not None  # as its row is in ``EXPORTERS``
+    with plugin.guarded(f"cannot write {printable(path, 300)}"):
+        notes = [*plugin.load().export(selection, path, options)]
+    if not all(isinstance(each, Diagnostic) for each in notes) or not path.is_file():
+        raise plugin.error(f"expected export to write {printable(path, 300)} and to return notes")
+    return notes
 
 
 def exporters_at(path: str | Path) -> list[Exporter]:
     """Return the exporters that write files of this suffix, or folders if there is none."""
     suffix = Path(path).suffix.lower() or FOLDER
+    _find_plugin(suffix)
     return [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
 
 
 def exporters_of(path: str | Path, content: Content) -> list[str]:
     """Return the keys in ``EXPORTERS`` that write this content to such files, or raise."""
     suffix = Path(path).suffix.lower()
+    _find_plugin(suffix or FOLDER)
     kinds = {key: kind for key, kind in EXPORTERS.items() if content in kind.stores}
     found = [key for key, kind in kinds.items() if (suffix or FOLDER) in kind.suffixes]
     if found:
@@ -204,7 +248,9 @@ def exporters_of(path: str | Path, content: Content) -> list[str]:
         raise RigError(
             "there are only keypoints: a motion of joints cannot be written (.npz stores points)"
         )
-    known = ", ".join(dict.fromkeys(each for kind in kinds.values() for each in kind.suffixes))
+    plugged = (f".{found.name}" for found in plugins_of("exporters"))
+    suffixes = (each for kind in kinds.values() for each in kind.suffixes)
+    known = ", ".join(dict.fromkeys((*suffixes, *plugged)))
     what = "no motion exporter" if content == "frames" else "no exporter"
     shown = suffix or FOLDER if content == "frames" else suffix
     raise UnsupportedFormatError(f'{what} for "{shown}"; supported: {known}')
@@ -241,14 +287,13 @@ def export(
     chosen.skinning = chosen.skinning if skinning is None else skinning
     chosen.meta, chosen.optimizes = meta or chosen.meta, optimizes or chosen.optimizes
     plan = _plan(selection, Path(path), chosen)
-    module = import_module(f"{__name__}.{plan.key}")
     notes = list[Diagnostic]()
     # A folder is written to a temporary one, which is renamed at the end.
     with all_or_none([] if plan.kind.folder else plan.files(chosen)):
         for each, file in plan.groups:
             part = each.parts[0]
             with raising():  # sampling and comparing may take long; saving holds signals itself
-                notes += module.export(each, file, replace(chosen, world_up=part.up))
+                notes += _write(plan.key, each, file, replace(chosen, world_up=part.up))
             if part.frames is None or plan.kind.omits_hidden:
                 notes += _hidden_note(each.actors, plan.kind)
             if part.content == "frames" and not plan.kind.stores_many:

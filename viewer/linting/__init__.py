@@ -8,7 +8,7 @@ from viewer.linting._files import Recheck, lint_files, recheck
 from viewer.linting._finding import MAX_ROTATION, Finding, LintOptions
 from viewer.linting._places import Places, places_of, points_of
 from viewer.linting._report import describe, finding_text, summary, worst_first
-from viewer.linting._running import CHECKS, Check, lint_scene
+from viewer.linting._running import CHECKS, Check, lint_scene, used_checks
 from viewer.linting._subject import Subject
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "Subject",
     "describe",
     "finding_text",
+    "known_codes",
     "lint_files",
     "lint_scene",
     "places_of",
@@ -36,3 +37,9 @@ __all__ = [
 
 CODES = {name: code for name, code in ALL_CODES.items() if name[0] in "FGWBSMYC"}
 """By code: files, glTF files, weights, bindings, skeletons, meshes, symmetry and clips."""
+
+
+def known_codes() -> dict[str, Code]:
+    """Return ``CODES`` with those of plug-ins."""
+    used_checks()
+    return CODES | {name: code for name, code in ALL_CODES.items() if name[0] == "P"}

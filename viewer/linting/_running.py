@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -9,15 +10,18 @@ from importlib import import_module
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import CODES
 from viewer.errors import FormatError
 from viewer.linting._finding import Finding, LintOptions
 from viewer.linting._subject import Subject, counting_of
 from viewer.phrases import listed
+from viewer.plugins import added_to, plugin_of
 from viewer.progress import report
 from viewer.rigs.arrays import Ints
 from viewer.rigs.motion.animation_choice import play_animation
 from viewer.rigs.scene import Actor, Scene, scene_rate
 
+_PLUGGED_CODE = re.compile("P[A-Z0-9]+")
 _NAMED = 3  # maximum number of animations that a note names
 
 
@@ -56,7 +60,42 @@ CHECKS = {
     "people": Check("people", of_motion=True),
     "jitter": Check("jitter", of_motion=True, of_animations=True),
 }
-"""Modules in this folder with a function ``check(subject)``, which yields findings, in order."""
+"""Modules in this folder with a function ``check(subject)``, which yields findings, in order.
+
+The module of a plug-in also has ``CODES``, a dict of ``viewer.diagnostics.Code`` by code: "P" and
+more capitals or digits. ``CHECK`` is its row, if the check depends on motions."""
+
+
+def used_checks() -> dict[str, Check]:
+    """Return all rows, with those of plug-ins, whose codes are then known."""
+    found = dict(CHECKS)
+    for plugin in added_to("checks", CHECKS):
+        module = plugin.load()
+        found[plugin.name] = getattr(module, "CHECK", Check(plugin.name))
+        if not isinstance(found[plugin.name], Check):
+            raise plugin.error(f"expected CHECK to be a Check, found {found[plugin.name]!r:.80}")
+        for name, code in module.CODES.items():
+            if not (_PLUGGED_CODE.fullmatch(name) and CODES.setdefault(name, code) == code):
+                raise plugin.error(
+                    'expected codes of "P" and other capitals or digits, which no other plug-in '
+                    f"has, found {name!r:.40}"
+                )
+    return found
+
+
+def _findings(name: str, subject: Subject) -> list[Finding]:
+    """Return the findings of one check."""
+    if name in CHECKS:
+        return [*import_module(f"viewer.linting.{name}").check(subject)]
+    plugin = plugin_of("checks", name)
+    assert plugin is not None  # as ``used_checks`` has found it
+    module = plugin.load()
+    with plugin.guarded("failed"):
+        found = [*module.check(subject)]
+    for finding in found:
+        if not isinstance(finding, Finding) or finding.code not in module.CODES:
+            raise plugin.error(f"expected findings of its own codes, found {finding!r:.80}")
+    return found
 
 
 def lint_scene(
@@ -75,13 +114,15 @@ def lint_scene(
         subjects.append(Subject(actor, index, scene.up, chosen, counting, lost, people))
     # The key rate of the animation that plays does not apply to the frames of others.
     others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
-    steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]
+    checks = used_checks()
+    checked = _checked(subjects, others, checks)
+    steps = [(subject, name) for subject, names in checked for name in names]
     findings: list[Finding] = []
     for number, (subject, name) in enumerate(steps):
-        report(number, len(steps), what=f"{subject.actor.name}: {CHECKS[name].title}")
+        report(number, len(steps), what=f"{subject.actor.name}: {checks[name].title}")
         # Products of huge numbers overflow; vertices that far away are reported as strays.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            findings += import_module(f"viewer.linting.{name}").check(subject)
+            findings += _findings(name, subject)
         if number + 1 == len(steps) or steps[number + 1][0] is not subject:
             subject.tracks.clear()  # a long track uses much memory, and is not needed again
     return _together(findings)
@@ -108,16 +149,16 @@ def _joined(group: Sequence[Finding]) -> Finding:
 
 
 def _checked(
-    subjects: Sequence[Subject], options: LintOptions
+    subjects: Sequence[Subject], options: LintOptions, checks: Mapping[str, Check]
 ) -> Iterator[tuple[Subject, list[str]]]:
     """Yield each actor, and copies of it that play the figure's other animations, with checks."""
-    again = [name for name, kind in CHECKS.items() if kind.of_animations]
+    again = [name for name, kind in checks.items() if kind.of_animations]
     known: set[int] = set()
     for subject in subjects:
         figure = subject.actor.figure
         is_new = id(figure) not in known
         known.add(id(figure))
-        yield subject, [name for name, kind in CHECKS.items() if is_new or kind.of_motion]
+        yield subject, [name for name, kind in checks.items() if is_new or kind.of_motion]
         for animation in range(len(figure.animations)) if is_new else ():
             if animation != subject.actor.animation:
                 actor = _playing(subject.actor, animation)

@@ -1,1 +1,1 @@
-"""The files of a plug-in that ``viewer new-plugin`` writes: a format and a scalar quantity."""
+"""The files of a plug-in that ``viewer new-plugin`` writes: a format, a quantity and a check."""

@@ -36,6 +36,7 @@ from viewer.exporters import (
     exporters_at,
     sampled,
     suited_exporter,
+    usable_exporters,
 )
 from viewer.exporters._motion_paths import files_at, is_together, motion_paths, part_paths
 from viewer.exporters._options import SAFE_NAMES, PageOptions
@@ -156,7 +157,7 @@ def _moving_actors(state: AppState) -> list[Actor]:
 
 def motion_suffixes() -> tuple[str, ...]:
     """Return the suffixes of files that contain one actor's motion; the default is first."""
-    kinds = [kind for kind in EXPORTERS.values() if kind.stores_motion and not kind.is_numbered]
+    kinds = [kind for kind in usable_exporters() if kind.stores_motion and not kind.is_numbered]
     found = dict.fromkeys(suffix for kind in kinds if not kind.folder for suffix in kind.suffixes)
     return (".bvh", *(suffix for suffix in found if suffix != ".bvh"))
 
@@ -344,7 +345,7 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
 
 def pose_formats() -> dict[str, Exporter]:
     """Return the exporters of poses by suffix; none of them keeps a motion then."""
-    kinds = [_of_pose(kind) for kind in EXPORTERS.values() if "pose" in kind.stores]
+    kinds = [_of_pose(kind) for kind in usable_exporters() if "pose" in kind.stores]
     return {suffix: kind for kind in kinds for suffix in kind.suffixes}
 
 

@@ -13,7 +13,13 @@ from viewer.formats._archive.checking import archive_of
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.results import Options as Options
 from viewer.formats.video_mocap.results import Results, capture_of
-from viewer.formats.video_mocap.tools import TOOLS, folder_tool, module_of, tool_of
+from viewer.formats.video_mocap.tools import (
+    TOOLS,
+    folder_tool,
+    module_of,
+    read_results,
+    tool_of,
+)
 from viewer.phrases import listed, printable
 from viewer.rigs.captures.capture import Capture
 
@@ -34,7 +40,7 @@ def _file(source: Source) -> Results:
             "F002.video-unknown: expected results of video motion capture, found keys {found}",
             found=listed(list(archive.keys), 12),
         )
-    found: Results = module_of(tool).read(source, archive)
+    found = read_results(tool, source, archive)
     unread = [printable(key, 40) for key in sorted(archive.unread())]
     ignored = (("not needed", listed(unread, _LISTED)),) if unread else ()
     return replace(found, facts=(*found.facts, *ignored))

@@ -9,6 +9,9 @@ from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
+from viewer.formats.video_mocap.results import Results
+from viewer.phrases import printable
+from viewer.plugins import added_to, plugin_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,8 @@ TOOLS = {
     "romp": Tool("ROMP, BEV", "video_results.npz, NAME.npz"),
     "parameters": Tool("SMPL parameters of other tools", "dicts with the usual keys"),
 }
-"""Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``."""
+"""Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``. Those of
+plug-ins are tried last."""
 
 
 def module_of(tool: str) -> ModuleType:
@@ -43,8 +47,21 @@ def module_of(tool: str) -> ModuleType:
     return import_module(f"{__package__}.{tool}")
 
 
+def read_results(tool: str, source: Source, archive: Archive) -> Results:
+    """Read a file of a tool, which may be a plug-in's."""
+    plugin = None if tool in TOOLS else plugin_of("tools", tool)
+    if plugin is None:
+        own: Results = module_of(tool).read(source, archive)
+        return own
+    with plugin.guarded(f"cannot read {printable(source.path, 300)}"):
+        found = plugin.load().read(source, archive)
+    if not isinstance(found, Results):
+        raise plugin.error(f"expected Results from read, found {type(found).__name__}")
+    return found
+
+
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool, or None."""
+    """Return the key in ``TOOLS`` of an archive's tool, or the name of a plug-in's; or None."""
     problem: FormatError | None = None
     for tool in TOOLS:
         try:
@@ -52,6 +69,10 @@ def tool_of(archive: Archive) -> str | None:
                 return tool
         except FormatError as found:  # in an array of objects that other tools may not need
             problem = problem or found
+    for plugin in added_to("tools", TOOLS):
+        with plugin.guarded("cannot recognise files"):
+            if plugin.load().recognises(archive):
+                return plugin.name
     if problem is not None:
         raise problem
     return None

@@ -162,9 +162,9 @@ def _find_plugin(key: str) -> None:
 
 def unused_plugins() -> list[Plugin]:
     """Return the plug-ins whose quantities have not been used, for menus."""
-    from viewer.plugins import plugins_of
+    from viewer.plugins import added_to
 
-    return [found for found in plugins_of("scalars") if found.name not in SCALARS]
+    return list(added_to("scalars", SCALARS))
 
 
 def _plugged_values(
