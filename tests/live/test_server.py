@@ -140,7 +140,7 @@ def test_removed_actor_disappears_but_the_last_one_stays(screen, live):
 
 def test_figure_is_exchanged(screen, live):
     actor = live.add(bar())
-    actor.figure, actor.pose = viewer.load().actors[0].figure, None
+    actor.figure, actor.own_pose = viewer.load().actors[0].figure, None
     actor.__post_init__()
     live.update()
     assert screen.state.scene.actors[-1].figure.mesh.n_vertices == 7561

@@ -21,7 +21,7 @@ from viewer.live.vmc import Receiver, Sender, TPose, is_humanoid, perform, perfo
 from viewer.phrases import counted
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rigs.pose import pose_key
+from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.scene import Actor, Scene
 
 _CAMERA = {"azimuth": (-1e9, 1e9), "inclination": (-90.0, 90.0), "distance": (1e-9, 1e12)}
@@ -98,7 +98,7 @@ def advance_live(state: AppState) -> None:
     for number, pose in poses.items():
         actor = server.actors.get(number)
         # The actor may have been replaced since the pose was checked.
-        if actor is not None and actor.pose is not None and _fits(actor, pose.dofs, pose.rotations):
+        if actor is not None and _fits(actor.own_pose, pose):
             actor.pose = pose
     if _perform(state, live) or poses:
         state.history.follow(state.update_version(), state.clock.time)
@@ -115,7 +115,7 @@ def _perform(state: AppState, live: Live) -> bool:
     actor = _humanoid(state, live) if given.is_loaded else None
     if actor is None or live.humanoid is None:
         return False
-    actor.pose = perform(live.humanoid, actor.require_pose(), given)
+    actor.pose = perform(live.humanoid, actor.pose, given)
     return True
 
 
@@ -125,10 +125,10 @@ def _send_performance(state: AppState, live: Live) -> None:
     actor = None if sender is None else _humanoid(state, live)
     if sender is None or actor is None or live.humanoid is None:
         return
-    key = actor.figure, pose_key(actor.require_pose())
+    key = actor.figure, pose_key(actor.pose)
     if key != live.sent:
         live.sent = key
-        sender.send(performed(live.humanoid, actor.require_pose()))
+        sender.send(performed(live.humanoid, actor.pose))
 
 
 def _humanoid(state: AppState, live: Live) -> Actor | None:
@@ -151,12 +151,11 @@ def _humanoid(state: AppState, live: Live) -> Actor | None:
     return None
 
 
-def _fits(actor: Actor, *arrays: np.ndarray[Any, Any]) -> bool:
-    own = actor.require_pose()
-    return all(
-        mine.shape == theirs.shape
-        for mine, theirs in zip((own.dofs, own.rotations), arrays, strict=True)
-    )
+def _fits(own: Pose | None, pose: Pose) -> bool:
+    """Return whether a pose has as many numbers as an actor's own."""
+    if own is None:
+        return False
+    return (own.dofs.shape, own.rotations.shape) == (pose.dofs.shape, pose.rotations.shape)
 
 
 _Answer = tuple[dict[str, Any], Actor | None]

@@ -63,6 +63,7 @@ LEFT_OUT = {
     "Camera": ("fixed", "seen"),
     "Actor": ("springs", "drive", "clip_origin", "animation"),
     "Figure": ("record", "origins", "animations", "facts"),
+    "Pose": ("skeleton",),
     "Skeleton": ("springs",),
 }
 """Fields that are not sent: functions, what only files and their export need, simulations."""

@@ -195,13 +195,13 @@ class Live:
             }
             self._ask("look", told, [np.asarray(actor.placement, np.float64)])
             sent.look = look
-        pose = actor.pose
+        pose = actor.own_pose
         if pose is None:
             return
         key = sent.pose.updated(*_numbers(pose))
         if key is sent.pose:
             return
-        shown = _sendable(actor).pose or pose
+        shown = _sendable(actor).own_pose or pose
         facts = {"actor": sent.number, "figure_scale": float(pose.figure_scale)}
         self._ask("pose", facts, [np.asarray(getattr(shown, name), float) for name in POSE])
         sent.pose = key
@@ -401,17 +401,17 @@ def _waited(process: subprocess.Popen[bytes], folder: Path) -> Path:
 
 def _sendable(actor: Actor) -> Actor:
     """Return an actor as it is sent; shapes that need the files of a model are applied to it."""
-    figure, pose = actor.figure, actor.pose
+    figure, pose = actor.figure, actor.own_pose
     shapes = figure.blend_shapes
     if shapes is None or shapes.space is None or pose is None:
         return actor
     figure = replace(shaped(figure, pose.shape_weights), blend_shapes=None)
-    return replace(actor, figure=figure, pose=replace(pose, shape_weights=np.zeros(0)))
+    return replace(actor, figure=figure, own_pose=replace(pose, shape_weights=np.zeros(0)))
 
 
 def _content(actor: Actor) -> object:
     """Return a key of what is sent as a whole: the figure and the motion."""
-    shapes, pose = actor.figure.blend_shapes, actor.pose
+    shapes, pose = actor.figure.blend_shapes, actor.own_pose
     is_applied = shapes is not None and shapes.space is not None and pose is not None
     weights = pose.shape_weights.tobytes() if is_applied and pose is not None else b""
     return actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights
@@ -422,7 +422,7 @@ def _look(actor: Actor) -> object:
 
 
 def _pose_key(actor: Actor) -> NumberKey:
-    return NumberKey() if actor.pose is None else NumberKey(*_numbers(actor.pose))
+    return NumberKey() if actor.own_pose is None else NumberKey(*_numbers(actor.own_pose))
 
 
 def _numbers(pose: Pose) -> list[Floats]:

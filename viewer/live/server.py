@@ -272,7 +272,7 @@ class Server:
 
     def _pose(self, message: Message, actor: Actor) -> Pose:
         """Return the pose of a message, which must fit the actor's figure."""
-        pose = actor.require_pose().copy()
+        pose = actor.pose.copy()
         for index, name in enumerate(POSE):
             is_free = name == "shape_weights"
             shape = (None,) if is_free else getattr(pose, name).shape
@@ -308,7 +308,7 @@ def _check(actor: Actor) -> None:
         raise MessageError("placement: expected a matrix (4, 4) of finite numbers")
     if actor.clip is not None:
         pose_actors([actor.copy()], time_span([actor])[0])
-    if actor.figure.mesh is not None and actor.pose is not None:
+    if actor.figure.mesh is not None and actor.own_pose is not None:
         posed, _ = deform(actor.figure, actor.pose)
         if not np.isfinite(posed).all():
             raise MessageError("expected finite vertices")
