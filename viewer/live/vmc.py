@@ -48,8 +48,7 @@ from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES
 from viewer.rigs.kinematics import posed_skeleton, world_matrices
-from viewer.rigs.pose import Pose, joint_rotations, placement_matrix
-from viewer.rigs.posing.pose_vector import set_joint_rotations
+from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, set_joint_rotations
 from viewer.rigs.retargeting.retarget import expression_weights
 from viewer.rigs.shape import shaped_skeleton
 from viewer.rigs.units import METRES
