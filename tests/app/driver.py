@@ -172,9 +172,9 @@ class Driver:
                 self.io.add_key_event(code, is_down)
                 self.step()
 
-    def type(self, text):
-        """Type letters like a keyboard: the key and the character."""
-        for letter in text:
+    def type(self, text, pressed=8):
+        """Type letters like a keyboard, the key and the character; further ones in one frame."""
+        for letter in text[:pressed]:
             code = getattr(imgui.Key, letter.lower() if letter.isalpha() else "", None)
             if code is not None:
                 self.io.add_key_event(code, True)
@@ -183,6 +183,9 @@ class Driver:
             if code is not None:
                 self.io.add_key_event(code, False)
                 self.step()
+        if text[pressed:]:
+            self.io.add_input_characters_utf8(text[pressed:])
+            self.step()
 
     def enter_value(self, label, text):
         """Type a number into a slider: Ctrl+click, the text, Enter."""
