@@ -23,6 +23,7 @@ NAMES = [
     "batch",
     "observing",
     "losses",
+    "live",
     "lint",
     "faults",
     "feet",

@@ -23,7 +23,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.gltf.document import Document, text_of
 from viewer.exporters.gltf.keyed import AnimationParts
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.exporters.vrm.humanoid import human_bones, parent_bone
+from viewer.exporters.vrm.humanoid import ancestors_of, human_bones, parent_bone
 from viewer.exporters.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
@@ -111,7 +111,7 @@ def _fill(
     """Add nodes, keys and the extension; return the expressions."""
     figure = animation.figure
     above = {bone: parent_bone(bone, bones) for bone in bones}
-    order = sorted(bones, key=lambda bone: _depth(bone, above))
+    order = sorted(bones, key=lambda bone: len(ancestors_of(bone)))
     # The bones are those of a T-pose in VRM's axes, on the ground.
     still, _ = in_t_pose(standing(figure, figure_pose(figure), bones), bones)
     world = world_matrices(still.require_skeleton(), figure_pose(still))
@@ -148,10 +148,6 @@ def _fill(
     document.root["extensions"] = {_EXTENSION: extension}
     document.declare(_EXTENSION)
     return weights
-
-
-def _depth(bone: str, above: dict[str, str]) -> int:
-    return 0 if not above[bone] else 1 + _depth(above[bone], above)
 
 
 def _moved(

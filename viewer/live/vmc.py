@@ -38,7 +38,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import OutputError, RigError, ViewerError
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.exporters.vrm.humanoid import human_bones, parent_bone
+from viewer.exporters.vrm.humanoid import ancestors_of, human_bones, parent_bone
 from viewer.formats._vrm.bones import modern_bone
 from viewer.live.osc import LARGEST, OscError, bundles, message_bytes, messages_of
 from viewer.phrases import printable
@@ -221,6 +221,8 @@ class TPose:
     """Positions of the bones in metres, in VRM's axes, above the ground: (3,)."""
     scale: float
     """Metres per unit of the figure."""
+    hips: Floats
+    """(3,). Position of the hips in the figure's rest pose, in its own axes and unit."""
 
     @property
     def leg(self) -> float:
@@ -248,6 +250,7 @@ def t_pose(figure: Figure) -> TPose:
         {bone: unit_rotation(world[joint]) for bone, joint in bones.items()},
         {bone: world[joint, :3, 3] for bone, joint in bones.items()},
         METRES.get(figure.unit, 1.0),
+        world_matrices(figure.require_skeleton(), rest)[bones["hips"], :3, 3],
     )
 
 
@@ -256,7 +259,7 @@ def perform(how: TPose, pose: Pose, given: Performance) -> Pose:
     figure, posed = how.figure, pose.copy()
     skeleton = shaped_skeleton(figure, pose.shape_weights)
     turned = {"": given.root.rotation}
-    for bone in sorted(given.bones, key=lambda each: _depth(each, given.bones)):
+    for bone in sorted(given.bones, key=lambda each: len(ancestors_of(each))):
         turned[bone] = turned[parent_bone(bone, given.bones)] @ given.bones[bone].rotation
     joints = {how.bones[bone]: bone for bone in turned if bone in how.bones}
     local = joint_rotations(skeleton, posed)
@@ -282,11 +285,6 @@ def perform(how: TPose, pose: Pose, given: Performance) -> Pose:
     return posed
 
 
-def _depth(bone: str, bones: Mapping[str, object]) -> int:
-    above = parent_bone(bone, bones)
-    return 0 if not above else 1 + _depth(above, bones)
-
-
 def _place_hips(how: TPose, posed: Pose, given: Performance) -> None:
     """Move the figure so that its hips are where those of the performer are, for its own size."""
     root, hips = given.root, given.bones["hips"]
@@ -296,13 +294,9 @@ def _place_hips(how: TPose, posed: Pose, given: Performance) -> None:
     ratio = how.leg / theirs if all(steps) and theirs > 0.0 else 1.0
     wanted = ratio * (root.position + root.rotation @ hips.position)
     offset = how.axes.T @ (wanted - how.places["hips"]) / how.scale
-    at_rest = world_matrices(how.figure.require_skeleton(), figure_pose(how.figure))
     skeleton = shaped_skeleton(how.figure, posed.shape_weights)
-    now = posed_skeleton(skeleton, posed).world
-    joint = how.bones["hips"]
-    posed.figure_translation = (
-        at_rest[joint, :3, 3] + offset - posed.figure_scale * now[joint, :3, 3]
-    )
+    now = posed_skeleton(skeleton, posed).world[how.bones["hips"], :3, 3]
+    posed.figure_translation = how.hips + offset - posed.figure_scale * now
 
 
 def performed(how: TPose, pose: Pose) -> Performance:
@@ -314,7 +308,6 @@ def performed(how: TPose, pose: Pose) -> Performance:
         for bone, joint in how.bones.items()
     }
     bones = {}
-    at_rest = world_matrices(how.figure.require_skeleton(), figure_pose(how.figure))
     for bone, joint in how.bones.items():
         above = parent_bone(bone, how.bones)
         if above:
@@ -323,7 +316,7 @@ def performed(how: TPose, pose: Pose) -> Performance:
                 how.places[bone] - how.places[above], turned[above].T @ turned[bone]
             )
         else:
-            place = (placement_matrix(pose) @ world[joint])[:3, 3] - at_rest[joint, :3, 3]
+            place = (placement_matrix(pose) @ world[joint])[:3, 3] - how.hips
             position = how.places[bone] + how.scale * how.axes @ place
             bones[bone] = Place(position, turned[bone])
     shapes = how.figure.blend_shapes

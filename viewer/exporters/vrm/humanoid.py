@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
+from functools import cache
 
 from viewer.diagnostics import note
 from viewer.errors import RigError
@@ -86,11 +87,14 @@ def bone_above(bone: str) -> str:
 
 def parent_bone(bone: str, bones: Container[str]) -> str:
     """Return the nearest ancestor of a bone among some bones; empty if there is none."""
-    above = bone
-    while above := _ALL_ABOVE.get(above) or bone_above(above):
-        if above in bones:
-            return above
-    return ""
+    return next((above for above in ancestors_of(bone) if above in bones), "")
+
+
+@cache
+def ancestors_of(bone: str) -> tuple[str, ...]:
+    """Return the ancestors of a bone in a complete skeleton, nearest first."""
+    above = _ALL_ABOVE.get(bone) or bone_above(bone)
+    return (above, *ancestors_of(above)) if above else ()
 
 
 def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:
