@@ -20,6 +20,7 @@ from viewer.rendering import lineup
 from viewer.rendering.casters import spheres_of
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes import shadow_passes
 from viewer.rendering.sampling import limit_passes, time_note
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
@@ -65,6 +66,28 @@ def test_shadow_of_a_plate_is_cast_by_light_at_45_degrees(offscreen):
     np.testing.assert_allclose((columns.min(), columns.max()), (18.75, 30.25), atol=1.0)
     np.testing.assert_allclose((rows.min(), rows.max()), (43.75, 55.25), atol=1.0)
     assert alpha[:, 65:].max() == 0 and pixels[:, :40][dark][:, :3].max() == 0
+
+
+@pytest.mark.parametrize("quality", ["normal", "final"])
+def test_ground_is_dark_only_in_the_part_of_the_map_with_casters(offscreen, monkeypatch, quality):
+    """A long plate fills a strip of the square map. The whole map, drawn too, looks the same."""
+    strip = plate(1.0)
+    strip = replace(strip, positions=strip.positions * [1.0, 1.0, 8.0])
+    light = lights(0.2, 1.0, azimuth=60.0, inclination=50.0, follow_camera=False)
+    how = scene_of(strip), with_shadows(lights=light, quality=quality), from_above()
+    part = draw(offscreen, *how)
+    original, areas = shadow_passes.light_view, []
+
+    def with_whole_map(*args):
+        view, extent, low, high = original(*args)
+        areas.append(np.prod(high - low))
+        return view, extent, np.zeros(2), np.ones(2)
+
+    monkeypatch.setattr(shadow_passes, "light_view", with_whole_map)
+    offscreen.render(Scene([]), (8, 8), from_above(), how[1], GROUND)  # forgets the shadow map
+    whole = draw(offscreen, *how)
+    assert 0.0 < max(areas) < 0.4
+    assert np.abs(part.astype(int) - whole).max() <= 1 and (whole[..., 3] > 30).any()
 
 
 def test_shadow_falls_on_another_figure(offscreen):

@@ -38,6 +38,9 @@ class Shadow:
     """(4, 4). Maps scene space to coordinates in the map, 0 to 1 on all axes."""
     texel: float
     """Side of a texel, scene units."""
+    low: Floats
+    high: Floats
+    """(2,). Opposite corners of the part of the map that contains all casters, 0 to 1."""
     strength: float = 1.0
     """Fraction of the light that a shadow removes, 0 to 1."""
     angle: float = 0.0

@@ -82,7 +82,7 @@ class Stage {
     gl.bindTexture(gl.TEXTURE_2D, this.map);
     const unit = [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0.5, 0.5, 0.5, 1];
     const scene = product4(unit, product4(light.projection, light.view));
-    this.light = { axes, middle, half, deep };
+    this.light = { axes, middle, halves, half, deep };
     return {
       u_shadow_map: SHADOW_UNIT,
       u_shadow_matrix: product4(scene, rigidInverse(v)),
@@ -94,18 +94,21 @@ class Stage {
 
   // Draws the shadow on the ground, unless the camera is below it; see shadow_passes.py.
   drawShadow(camera, shadow) {
-    const gl = this.gl, { ground, up } = this.header, { axes, middle, half, deep } = this.light;
-    const { opacity, grazing, strength } = this.header.shadow;
+    const gl = this.gl, { ground, up } = this.header;
+    const { axes, middle, halves, half, deep } = this.light;
+    const { opacity, grazing, strength, radius } = this.header.shadow;
     const above = up === "z" ? [0, 0, 1] : [0, 1, 0];
     const height = dot(above, ground.placement.slice(12, 15));
     const slope = dot(above, axes[2]);
     const fade = Math.min(Math.max((slope - grazing[0]) / (grazing[1] - grazing[0]), 0), 1);
     if (fade === 0 || dot(above, camera.eye) <= height) return;
-    // From a corner of the map at depth 0, along the light, to the ground.
+    // The part of the map that the figures and the filter darken, from the middle to its sides.
+    const reach = [0, 1].map((k) => Math.min(halves[k] / half + (2 * (radius + 1)) / SHADOW_SIDE, 1));
+    // From a corner of this part at depth 0, along the light, to the ground.
     const away = axes[2].map((x) => -2 * deep * x), depths = [], places = [];
     for (const [u, w] of [[-1, -1], [1, -1], [-1, 1]]) {
-      const corner = [0, 1, 2].map((i) => axes[0][i] * (middle[0] + u * half) +
-        axes[1][i] * (middle[1] + w * half) + axes[2][i] * (middle[2] + deep));
+      const corner = [0, 1, 2].map((i) => axes[0][i] * (middle[0] + u * reach[0] * half) +
+        axes[1][i] * (middle[1] + w * reach[1] * half) + axes[2][i] * (middle[2] + deep));
       const depth = (height - dot(above, corner)) / dot(above, away);
       depths.push(depth);
       places.push(corner.map((x, i) => x + depth * away[i]));
@@ -117,6 +120,7 @@ class Stage {
     this.patchArray ??= vertexArray(gl, program, { in_corner: [this.square, 2] });
     setUniforms(gl, program, { ...shadow, u_projection: camera.projection,
       u_model_view: product4(camera.view, placement),
+      u_part: [0.5 - 0.5 * reach[0], 0.5 - 0.5 * reach[1], ...reach],
       u_depth: [depths[0], depths[1] - depths[0], depths[2] - depths[0]],
       u_opacity: opacity * fade * strength });
     gl.bindVertexArray(this.patchArray);

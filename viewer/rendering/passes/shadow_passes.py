@@ -67,10 +67,10 @@ class ShadowPass:
 
         ``direction``: unit, towards the light.
         """
-        view, extent = light_view(spheres, direction, self.side)
+        view, extent, low, high = light_view(spheres, direction, self.side)
         _draw_depths(self._framebuffer, draw, view)
         matrix = _TO_TEXTURE @ view.projection @ view.matrix
-        return Shadow(self._texture, matrix, 2.0 * extent / self.side)
+        return Shadow(self._texture, matrix, 2.0 * extent / self.side, low, high)
 
     def release(self) -> None:
         """Free the map."""
@@ -179,15 +179,21 @@ class GroundShadowPass:
         fade = float(np.clip((slope - GRAZING[0]) / (GRAZING[1] - GRAZING[0]), 0.0, 1.0))
         if fade == 0.0:
             return
-        # Rays through the corners of the map meet the ground at these depths.
-        corners = np.array([[0.0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]) @ back.T
+        # Only this part of the map and what the filter adds to it can be dark.
+        filtered = shadow.filter(is_ground=True)
+        margin = math.hypot(*filtered) + 1.0 / shadow.texture.width
+        low, high = np.maximum(shadow.low - margin, 0.0), np.minimum(shadow.high + margin, 1.0)
+        # Rays through three of its corners meet the ground at these depths.
+        ends = (low[0], low[1]), (high[0], low[1]), (low[0], high[1])
+        corners = np.array([(x, y, 0.0, 1.0) for x, y in ends]) @ back.T
         depths = (height - corners[:, :3] @ up) / (up @ away)
         places = corners[:, :3] + depths[:, None] * away
         program = self.programs.drawing("patch", fragment="ground_shadow")
         growth = depths[1:] - depths[0]
         values = {
             "u_shadow_map": SHADOW_UNIT,
-            "u_shadow_filter": shadow.filter(is_ground=True),
+            "u_shadow_filter": filtered,
+            "u_part": (*low.tolist(), *(high - low).tolist()),
             "u_depth": (float(depths[0]), *growth.tolist()),
             "u_opacity": SHADOW_OPACITY * fade * shadow.strength,
         }
@@ -253,9 +259,11 @@ def map_side(size: tuple[int, int]) -> int:
     return min(max(wanted, _SIDES[0]), _SIDES[1])
 
 
-def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
-    """Return a directional light's view that contains spheres (N, 4), and its half extent."""
-    # ``direction`` is a unit vector towards the light.
+def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float, Floats, Floats]:
+    """Return a directional light's view of spheres (N, 4), half its extent, and where they are.
+
+    ``direction``: unit vector towards the light. Where they are: opposite corners, (2,), 0 to 1.
+    """
     # Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
     # not crawl while figures move.
     axes = np.stack([*light_axes(direction), direction])
@@ -270,7 +278,9 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     middle = 0.5 * (low + high)
     middle[:2] = np.round(middle[:2] / texel) * texel
     deep = 0.5 * (high[2] - low[2]) * 1.01 + 1e-3 * extent
-    return _parallel_view(axes, middle, np.array([extent, extent, deep])), float(extent)
+    view = _parallel_view(axes, middle, np.array([extent, extent, deep]))
+    corners = (0.5 + 0.5 * (end - middle)[:2] / extent for end in (low, high))
+    return view, float(extent), *corners
 
 
 def _parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
