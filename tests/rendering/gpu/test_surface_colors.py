@@ -193,6 +193,19 @@ def test_mipmaps_of_the_processor_are_those_of_the_driver(ctx, is_linear, stored
     texture.release()
 
 
+def test_mipmaps_of_odd_sides_are_means_of_the_texels_that_they_cover():
+    """Five rows become two of 2.5 each, then one; three columns become one."""
+    pixels = noise(5, 3).astype(float)
+    halves = np.array([[2.0, 2, 1, 0, 0], [0, 0, 1, 2, 2]]) / 5.0
+    wanted = np.einsum("yr,rxc->yc", halves, pixels)[:, None] / 3.0
+    first, second = reduced(pixels.astype(np.uint8), True)
+    np.testing.assert_allclose(first, wanted, rtol=0, atol=0.51)
+    np.testing.assert_allclose(second[0, 0], pixels.mean(axis=(0, 1)), rtol=0, atol=0.51)
+    # 1000 bright rows would not fit into 16 bits if they were added up.
+    bright = np.full((1001, 2, 4), 255, dtype=np.uint8)
+    assert all((level == 255).all() for level in reduced(bright, False))
+
+
 def test_sides_of_any_length_have_all_levels(ctx):
     texture = picture_texture(ctx, np.full((5, 3, 4), 128, dtype=np.uint8), [], is_linear=True)
     for level, size in enumerate([(3, 5), (1, 2), (1, 1)]):

@@ -119,14 +119,14 @@ def picture_texture(
     stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
     texture = context.texture(size, 4, flipped, internal_format=stored_as)
     texture.repeat_x = texture.repeat_y = False
-    _build_mipmaps(context, texture, flipped, is_linear)
+    build_mipmaps(context, texture, flipped, is_linear)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # would double the drawing time in software
     return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
 
 
-def _build_mipmaps(
+def build_mipmaps(
     context: moderngl.Context, texture: moderngl.Texture, pixels: Bytes, is_linear: bool
 ) -> None:
     """Fill the mipmaps of a texture, whose texels are (H, W, 4) uint8."""
@@ -134,8 +134,7 @@ def _build_mipmaps(
     # Mesa's driver in software compiles a shader for it in each process: 100 ms. This takes up to
     # twice as long per texel as the driver does afterwards, 15 ms for the largest: figures with
     # fewer than ten of them, or many small ones, gain.
-    is_small = width * height <= _FEW_TEXELS and not (width & (width - 1) or height & (height - 1))
-    if is_small and is_software(context):
+    if width * height <= _FEW_TEXELS and is_software(context):
         arguments = [ctypes.c_uint, *[ctypes.c_int] * 5, ctypes.c_uint, ctypes.c_uint]
         upload = gl_function(context, "glTexImage2D", None, [*arguments, ctypes.c_void_p])
     if upload is None:
@@ -151,9 +150,9 @@ def _build_mipmaps(
 
 
 def reduced(texels: Bytes, is_linear: bool) -> Iterator[Bytes]:
-    """Yield the mipmaps of (H, W, 4) uint8 texels, whose sides are powers of two, largest first.
+    """Yield the mipmaps of (H, W, 4) uint8 texels, largest first.
 
-    Each texel is the mean light of four, or of two once a side is 1; alpha is linear.
+    Each texel is the mean light of those that it covers; alpha is linear.
     """
     tables = [_light_tables(is_linear)] * 3 + [_light_tables(True)]
     # Without "clip", ``take`` checks the indices and takes a third longer.
@@ -171,9 +170,22 @@ def reduced(texels: Bytes, is_linear: bool) -> Iterator[Bytes]:
 
 
 def _sums_of_four(plane: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Return the sums of 2 x 2 texels of a plane; a side of 1 counts its texels twice."""
-    rows = plane[0::2] + plane[1::2] if len(plane) > 1 else 2 * plane
-    return rows[:, 0::2] + rows[:, 1::2] if plane.shape[1] > 1 else 2 * rows
+    """Return four times the means of the texels that those of half the size cover."""
+    return _sums_of_two(_sums_of_two(plane).T).T
+
+
+def _sums_of_two(rows: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Return twice the means of the rows that those of half the number cover, at least one."""
+    count, half = len(rows), len(rows) // 2
+    if count == 1:
+        return 2 * rows
+    if count % 2 == 0:
+        return rows[0::2] + rows[1::2]
+    # Of 2 n + 1 rows, row k of n covers (2 n + 1) / n: the last n - k parts of n of one, a whole
+    # one, and the first k + 1 parts of a third (Guthe and Heckbert 2005).
+    parts, whole = np.arange(half, dtype=np.float32)[:, None], np.float32(half)
+    sums = (whole - parts) * rows[0:-1:2] + whole * rows[1::2] + (parts + 1) * rows[2::2]
+    return np.rint(sums * np.float32(2.0 / count)).astype(np.uint16)
 
 
 @cache

@@ -7,7 +7,7 @@ import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.upload import as_uniform, checked
+from viewer.rendering.gpu.upload import as_uniform, build_mipmaps, checked
 from viewer.rendering.pinhole import frustum_corners, picture_size
 from viewer.rendering.view import View
 from viewer.rigs.arrays import Floats
@@ -78,13 +78,12 @@ class CameraImagePass:
             return known[1]
         if known is not None:
             known[1].release()
-        height, width = image.pixels.shape[:2]
-        texture = checked(
-            self.context,
-            self.context.texture((width, height), 4, np.ascontiguousarray(image.pixels).tobytes()),
-            f"an image of {width} x {height} pixels",
-        )
-        texture.build_mipmaps()
+        pixels = np.ascontiguousarray(image.pixels)
+        height, width = pixels.shape[:2]
+        made = self.context.texture((width, height), 4, pixels)
+        texture = checked(self.context, made, f"an image of {width} x {height} pixels")
+        # Camera images are shown as they are stored, without conversion to light.
+        build_mipmaps(self.context, texture, pixels, is_linear=True)
         texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
         texture.repeat_x = texture.repeat_y = False
         self._textures[camera] = image, texture
