@@ -6,10 +6,12 @@ Two maps are our own; the others are those that other programs name.
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
+from viewer.rendering.options import Color
 from viewer.resources import resource
 from viewer.rigs.arrays import Bytes, Floats, Ints
 from viewer.rigs.srgb import decode_srgb, encode_srgb
@@ -195,6 +197,15 @@ def part_palette(count: int) -> Bytes:
 def joint_colors(count: int) -> Floats:
     """Return a pale colour for each joint: (J, 3), linear."""
     return _spaced_hues(count, 0.58, 0.42, 0.72)
+
+
+def actor_colors(parts: Floats, colors: Sequence[Color | None]) -> Floats:
+    """Return the colours of the parts of each actor, (A, N, 3): its own colour if it has one."""
+    found = np.tile(parts, (len(colors), 1, 1))
+    for row, color in enumerate(colors):
+        if color is not None:
+            found[row] = color
+    return found
 
 
 def path_colors(count: int) -> Floats:

@@ -14,6 +14,7 @@ from viewer.rendering.lineup import Group, Lineup, placement_of, shows_mesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.view import View
+from viewer.rigs.motion.instances import posed_worlds
 from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped_skeleton
@@ -92,8 +93,6 @@ def update_skeletons(buffers: ActorBuffers, lineup: Lineup, options: DisplayOpti
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
-        from viewer.rigs.motion.instances import posed_worlds
-
         poses = [pose for _, pose in group]
         skeleton = shaped_skeleton(group[0][0].figure, poses[0].shape_weights)
         # Matrices are computed in one batch, and each pose caches its result.

@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.colors import joint_colors
+from viewer.rendering.colors import actor_colors, joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
@@ -133,9 +133,7 @@ def _repeated(rows: _Rows, n_joints: int, colors: Sequence[Color | None]) -> _Ro
     first = n_joints * np.arange(count, dtype=np.int32)[:, None]
     links[..., 0] += first
     links[..., 1] += np.where(links[..., 1] >= 0, first, 0)
-    painted = np.stack(
-        [rows.colors if color is None else 0 * rows.colors + color for color in colors]
-    )
+    painted = actor_colors(rows.colors, colors)
     ends, widths = (np.tile(part, (count, 1)) for part in (rows.ends, rows.widths))
     return _Rows(links.reshape(-1, 3), ends, widths, painted.reshape(-1, 3))
 

@@ -51,16 +51,14 @@ class SkeletonBuffers:
         cube: moderngl.Buffer,
         colors: Sequence[Color | None] = (None,),
     ) -> None:
-        from viewer.rendering.colors import joint_colors
+        from viewer.rendering.colors import actor_colors, joint_colors
         from viewer.rendering.gpu.box_buffers import BoxBuffers
 
         skeleton = figure.require_skeleton()
         self.context, self.figure, self.colors = context, figure, colors
         self._size = _size(figure)
         boxes = np.tile(_joint_boxes(skeleton, self._size), (len(colors), 1, 1))
-        painted = np.tile(joint_colors(skeleton.n_joints), (len(colors), 1, 1))
-        for row, color in enumerate(colors):
-            painted[row] = painted[row] if color is None else color
+        painted = actor_colors(joint_colors(skeleton.n_joints), colors)
         self.boxes = BoxBuffers(context, cube, boxes, painted.reshape(-1, 3))
         self._bones: dict[str, BoneBuffers] = {}
         self._key: tuple[NumberKey, bool] | None = None
