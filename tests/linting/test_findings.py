@@ -356,13 +356,6 @@ def test_influence_limit_error_is_the_vertex_displacement():
     assert told([found.diagnostic]) == [("W007.influences", values)]
 
 
-def test_swinging_foot_is_not_reported_as_sliding():
-    def step(root: np.ndarray, _: np.ndarray) -> None:
-        root[:, 2] = 2.5 * np.arange(FRAMES) / RATE  # 2.5 m/s, as a foot passes the ground
-
-    assert [finding.code for finding in lint_scene(moving(step))] == []
-
-
 def test_person_who_appears_later_has_no_gap():
     rows = np.arange(FRAMES)
     rows[:20] = rows[50:] = -1

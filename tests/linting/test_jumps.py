@@ -26,13 +26,20 @@ def jumps_of(places: np.ndarray, options: LintOptions | None = None) -> list[lis
 
 
 # The skeleton is 2 units high: the limits are 30 for all joints, and 10 units per second for jumps.
-@pytest.mark.parametrize(("speed", "frames"), [(5.0, []), (20.0, [[10]]), (-20.0, [[10]])])
+# Of a body that rests before and after, they are 0.08 units within a frame, which is 4.8 a second.
+@pytest.mark.parametrize(
+    ("speed", "frames"), [(4.0, []), (6.0, [[10]]), (20.0, [[10]]), (-20.0, [[10]])]
+)
 def test_a_root_that_stands_before_and_after_a_fast_step_jumps(speed, frames):
     assert jumps_of(np.where(np.arange(40) < 20, 0.0, speed / RATE)) == frames
 
 
 def test_a_root_that_keeps_moving_fast_does_not_jump():
     assert jumps_of(20.0 / RATE * np.arange(40)) == []
+
+
+def test_a_root_that_begins_to_move_does_not_jump():
+    assert jumps_of(np.maximum(np.arange(40) - 20, 0) * 6.0 / RATE) == []
 
 
 def test_repeated_frames_are_no_jumps():

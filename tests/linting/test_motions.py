@@ -31,7 +31,9 @@ def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]
         translations=places,
         timing=Timing(RATE, np.arange(count), first_frame=100),
     )
-    return lint_scene(scene_of(figure, clip), LintOptions(**options))
+    # Where heights change within a frame, the body also jumps.
+    checked = lint_scene(scene_of(figure, clip), LintOptions(**options))
+    return [one for one in checked if one.code != "C003"]
 
 
 @pytest.mark.parametrize("floor", FLOORS)
@@ -286,9 +288,10 @@ def test_low_swings_next_to_a_standing_foot_are_not_slides():
     assert codes_of_legs(STILL, swings) == []
 
 
-@pytest.mark.parametrize("speed", [0.35, 0.5, 0.8])
+@pytest.mark.parametrize("speed", [0.35, 0.5, 0.8, 2.5])
 def test_feet_that_slide_together_are_found(speed):
-    # The body moves with the feet, as if on wheels. Feet slide above 0.2 * 1.6 = 0.32 m/s.
+    # The body moves with the feet, as if on wheels. Feet slide above 0.2 * 1.6 = 0.32 m/s, and a
+    # single one swings above 1.34 * 1.6 = 2.1 m/s.
     assert "C007" in codes_of_legs(STILL, STILL, speed * _K / RATE)
 
 

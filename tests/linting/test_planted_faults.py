@@ -33,6 +33,8 @@ COMPANIONS = {
     "vertex a hundred sizes away": {"Y001", "M003"},  # inverts the volume
     "jitter": {"C007"},  # moves by 20 mm back and forth
     "exchanged people": {"C003"},  # both people jump
+    "sinking": {"C003"},  # within a frame
+    "floating": {"C003"},
     # The frame is also off the path of its neighbours; the ankle follows the knee.
     "jump": {"C020"},
     "fast turn": {"C003", "C020"},

@@ -30,6 +30,9 @@ from viewer.rigs.skeleton import Skeleton, joint_labels
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
 _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
+# A body that steps aside in one frame, and rests before and after, does not move: falls accelerate.
+_STEP = 0.04  # minimum length, relative to the size: 70 mm for a person
+_STILL, _BESIDE = 0.1, 4  # maximum length of steps beside it, relative to it, and their number
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
@@ -155,6 +158,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
         speeds[rows[1:]] = np.where(track.stepped[rows[1:]], 0.0, leaps)
         fast = _too_fast(track, speeds, limit)
     if fast is None:
+        yield from _steps(subject, track, skeleton) if given is None else ()
         return
     yield subject.found(
         "C003.joint: {n}: {joint} moves at {speed} at frame {frame}, {time:z.3f} s (limit {limit})",
@@ -170,6 +174,39 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
         frames=track.numbers[fast.rows],
         times=track.times[fast.rows],
         at=("frames", fast.worst),
+    )
+
+
+def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
+    """Report a body that is elsewhere from one frame on: it moves as little before as after."""
+    rows, carriers = track.on_frames(), travelling_joints(track, skeleton)
+    places = track.positions[rows][:, carriers]
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=2)
+    known = track.present[rows[1:]] & track.present[rows[:-1]]
+    around = [k for k in range(-_BESIDE, _BESIDE + 1) if k != 0]
+    is_step = (steps > _STEP * track.size) & (largest_around(steps, around) < _STILL * steps)
+    is_step &= known[:, None] & ~track.stepped[rows[1:]][:, carriers]
+    is_step[:_BESIDE] = is_step[max(len(steps) - _BESIDE, 0) :] = False
+    frames, joints = np.nonzero(is_step)
+    if len(frames) == 0:
+        return
+    sizes = steps[frames, joints]
+    worst = int(sizes.argmax())
+    found = rows[frames + 1]
+    first, each = int(found[worst]), track.of_each(found)
+    yield subject.found(
+        "C003.step: {n}: {joint} is {distance} away from frame {frame} on, {time:z.3f} s",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=joint_labels(skeleton)[int(carriers[joints[worst]])],
+        distance=subject.length(float(sizes[worst]) / track.scale),
+        frame=int(track.numbers[first]),
+        time=float(track.times[first]),
+        part="clip",
+        joints=np.unique(carriers[joints]),
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", first),
     )
 
 

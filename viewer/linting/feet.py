@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Subject, Track, track_of
+from viewer.linting._subject import Subject, Track, track_of, travelling_joints
 from viewer.phrases import counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.cleanup.frames import runs_of
@@ -29,6 +29,7 @@ from viewer.rigs.skeleton import joint_labels
 # Keyframes are drawn by hand: feet that are shifted or roll below the ground are a matter of style.
 # What is reported as a warning there cannot be one: a body that skates, or stands in the ground.
 _ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
+_WITH_BODY = 0.1  # maximum difference of the velocities of foot and body, relative to the foot's
 _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
 # Floors of whole motions, as fractions of the figure's height
 _BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
@@ -235,7 +236,10 @@ def _slipped(
         for first, last in runs_of(touches[:, foot]):
             touches[first : first + half * (first > 0), foot] = False
             touches[max(last - half * (last < n_frames), 0) : last, foot] = False
-    slides = _sliding(speeds / track.body, touches & ~stands, stands, step)
+    # Of the motion as it is: on moving ground, all that rests moves alike.
+    body = track.positions[:, travelling_joints(track, subject.actor.figure.require_skeleton())[-1]]
+    glides = np.all([_moves_with(path.heel, body) for path in track.paths], axis=0)
+    slides = _sliding(speeds / track.body, touches & ~stands, stands, glides, step)
     # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
@@ -309,13 +313,25 @@ def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
     return carried > _ALONG * lengths.sum() and carried > _CARRIED * height * track.scale
 
 
-def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:
-    """Return the frames (F, N) in which low feet slide; ``speeds`` are body sizes per second."""
+def _moves_with(foot: Floats, body: Floats) -> Bools:
+    """Return the frames (F,) in which a foot moves as the body does: it does not swing."""
+    steps, body_steps = np.gradient(foot, axis=0), np.gradient(body, axis=0)
+    apart = np.linalg.norm(steps - body_steps, axis=1)
+    result: Bools = apart < _WITH_BODY * np.linalg.norm(steps, axis=1)
+    return result
+
+
+def _sliding(speeds: Floats, low: Bools, stands: Bools, glides: Bools, step: float) -> Bools:
+    """Return the frames (F, N) in which low feet slide; ``speeds`` are body sizes per second.
+
+    ``glides``: (F,), where all feet move with the body.
+    """
     # A foot also swings close to the ground, but while another foot stands, and only after speeding
     # up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
     # no other foot stands. Starting and landing feet slide only for short times. A foot that stays
     # low and moves for longer than any swing is dragged.
-    moves = low & (speeds > limits.FAST) & (speeds < limits.SWINGS)
+    # Faster than any foot that slides, a foot swings, unless the whole body moves with it.
+    moves = low & (speeds > limits.FAST) & ((speeds < limits.SWINGS) | glides[:, None])
     result = np.zeros_like(moves)
     for foot in range(moves.shape[1]):
         is_alone = np.delete(stands, foot, axis=1).sum(axis=1) == 0
