@@ -93,7 +93,8 @@ class Window:
         return done.stdout.strip()
 
     def screen(self):
-        return np.array(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
+        # RGB, not copied: while a test waits, it looks twenty times a second.
+        return np.asarray(ImageGrab.grab(xdisplay=self.display))
 
     def wait_until_quiet(self, still=0.25):
         """Return the screen once it shows the figure and has not changed for ``still`` seconds."""
