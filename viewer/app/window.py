@@ -77,29 +77,29 @@ def show(
 
     Parameters
     ----------
-    scene : Scene
+    scene
         Scene to show; the user's edits change its poses.
-    camera : Camera, optional
+    camera
         Initial camera; fitted to the scene if omitted.
-    options : DisplayOptions, optional
+    options
         Initial display settings.
     paths : sequence of str or Path
         Files of the scene, for the title and the list of recent files.
-    scale : float, optional
+    scale
         Scale of the interface; the scale of the screen if omitted.
-    fit_distance : bool
+    fit_distance
         Whether the camera is kept fitted to the scene until the user moves it.
     builders : sequence of Builder
         Captures of the scene that have not been read completely yet.
-    plays : bool
+    plays
         Whether motions play from the start.
-    motion : MotionSettings, optional
+    motion
         Settings with which the scene's motions were read.
-    shell : Shell, optional
+    shell
         Window that is already open; a new one if omitted. It is closed at the end.
     messages : sequence of str
         Messages to show in the window.
-    live : Live, optional
+    live
         What other programs may change in the window.
 
     Raises

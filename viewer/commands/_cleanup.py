@@ -77,7 +77,7 @@ def clean(what: Scene | Actor, **options: object) -> Scene:
 
     Parameters
     ----------
-    what : Scene or Actor
+    what
         Unchanged; the result has copies of its actors.
     **options
         Options of the command with underscores, applied in this order: ``merge_ids`` (``[1, 4]``),

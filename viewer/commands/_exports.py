@@ -37,24 +37,24 @@ def export(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What is written; of a single actor, its placement in the scene is omitted.
-    path : str or Path
+    path
         The suffix selects the format. ``{person}`` in the name selects a file for each actor,
         ``{frame:05}`` one for each frame.
-    skinning : Skinning, optional
+    skinning
         Skinning method and options.
-    frames : range, optional
+    frames
         Numbers of the frames, without a step; the whole motion if omitted.
-    fps : float, optional
+    fps
         Frames per second; those of the motion if omitted.
-    time : float, optional
+    time
         Seconds of the motions: writes the poses at that time.
-    optimizes : bool
+    optimizes
         Quantise vertices, which glTF and VRM support.
-    meta : VrmMeta, optional
+    meta
         Name, authors and licence of a VRM character; those of its file if omitted.
-    options : ExportOptions, optional
+    options
         All options, including those above.
 
     Returns

@@ -53,27 +53,27 @@ def render(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What is drawn, in its current pose; actors keep their pose.
     size : (int, int)
         Width and height in pixels.
-    camera : Camera, optional
+    camera
         Camera; by default one that frames the scene, with the settings below.
-    options : DisplayOptions, optional
+    options
         Display options; shadows are drawn (quality normal) if omitted.
-    time : float, optional
+    time
         Seconds of the motions; the current pose if omitted.
-    look_at : str, optional
+    look_at
         Joint or actor at which the camera aims: ``"head"``, ``"fox/head"``, ``"1:pelvis"``.
-    distance : float, optional
+    distance
         Distance from the target, scene units.
     azimuth, inclination : float, optional
         Degrees about the up axis, and above the horizon.
-    orthographic : bool
+    orthographic
         Parallel projection.
-    scalar : str, optional
+    scalar
         Numbers that are shown as colours, such as ``"weight:left_knee"``.
-    background : str, optional
+    background
         ``"gradient"``, ``"white"``, ``"environment"``, ``"transparent"`` or ``"#rrggbb"``.
     quality : "draft", "normal" or "final", optional
         Without or with shadows, or with soft shadows and ambient occlusion.
@@ -142,22 +142,22 @@ def video(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What is drawn. Without a motion, the camera must rotate.
-    path : str or Path
+    path
         ``.mp4``, ``.webm`` or ``.gif`` (they need PyAV), or numbered images, as in
         ``frame_{frame:05}.png``.
     size : (int, int)
         Width and height in pixels.
-    options : DisplayOptions, optional
+    options
         Display options; shadows are drawn (quality normal) if omitted.
-    frames : range, optional
+    frames
         Numbers of the frames; the whole motion if omitted.
-    fps : float, optional
+    fps
         Frames per second; those of the motion if omitted.
-    speed : float, optional
+    speed
         0.5 is half as fast, -1 backwards.
-    turntable : bool or float
+    turntable
         Rotate the camera once during the motion, or in this number of seconds.
     look_at, follow : str, optional
         Joint or actor at which the camera aims at the start, or that it follows.

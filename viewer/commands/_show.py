@@ -39,13 +39,13 @@ def show(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What is shown. If the call blocks, the user's edits change its poses.
-    camera : Camera, optional
+    camera
         Initial camera; fitted to the scene if omitted.
-    options : DisplayOptions, optional
+    options
         Initial display settings; by default those of the user's preferences.
-    block : bool
+    block
         Whether to return when the window is closed. Otherwise it opens in another process, which
         shows what this program then changes: poses (set or changed in place), ``scene.time``,
         colours, placements, visibility, and actors that are added or removed.

@@ -19,11 +19,11 @@ def widget(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What is shown, with its motions.
-    skinning : Skinning, optional
+    skinning
         Skinning method and options.
-    height : int
+    height
         Height of the view, pixels.
 
     Returns

@@ -410,7 +410,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     ----------
     content : Figure, Clip or PoseRecord
         Content of the file.
-    path : str or Path
+    path
         Its suffix determines the format.
 
     Returns

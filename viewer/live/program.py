@@ -328,7 +328,7 @@ def connect(path: str | Path | None = None) -> Live:
 
     Parameters
     ----------
-    path : str or Path, optional
+    path
         The connection file that ``viewer serve`` printed; by default the usual one.
 
     Returns

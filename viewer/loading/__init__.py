@@ -56,13 +56,13 @@ def load(
         ``.fbx``, body models, PIG folders, AMASS files, EasyMocap folders, poses and images, in
         any order; names of models, as on the command line: ``"body"``, ``"fox"``, ``"anny"``,
         ``"smplx:neutral"``.
-    model : str or Path, optional
+    model
         Body model for captured bodies, or figure that a BVH file drives: a file or a name.
-    gender : str
+    gender
         Gender of the body model, if it is not that of the files.
-    max_size : int
+    max_size
         Larger files, in bytes, are rejected before they are read.
-    motion : MotionSettings, optional
+    motion
         How motions are interpreted: frame rate, up axis, unit and others.
 
     Returns

@@ -96,11 +96,11 @@ def figure(
         Texture coordinates, v = 0 at the bottom row of the image.
     texture : str, Path or (H, W, 3 or 4) uint8, optional
         Image file, or sRGB pixels with the top row first.
-    name : str
+    name
         Name of the figure.
     up : "y" or "z"
         Up axis.
-    unit : str
+    unit
         Length unit, such as ``"m"``; empty if it is unknown.
 
     Returns
@@ -164,7 +164,7 @@ def animate(
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a skeleton of J joints.
     rotations : (F, J, 3, 3), (F, J, 4), (F, J, 3) or (F, J, 6)
         Each joint's rotation relative to its parent: matrices, quaternions (x, y, z, w), rotation
@@ -172,13 +172,13 @@ def animate(
         2019, "6D"; PyTorch3D stores rows).
     translations : (F, 3), optional
         Translations of the whole figure, in its unit.
-    fps : float
+    fps
         Frames per second.
     representation : "matrix", "quaternion", "rotation_vector" or "6d", optional
         What ``rotations`` are; by default recognised by their shape.
     present : (F,) of bool, optional
         Whether the figure is present; all frames by default.
-    name : str
+    name
         Name of the motion.
 
     Returns

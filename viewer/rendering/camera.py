@@ -108,7 +108,7 @@ class Camera:
 
         Parameters
         ----------
-        aspect : float
+        aspect
             Width / height.
         box : (2, 3)
             Bounds that must lie between the near and the far plane, scene space.

@@ -223,7 +223,7 @@ def rest_pose(skeleton: Skeleton) -> Pose:
 
     Parameters
     ----------
-    skeleton : Skeleton
+    skeleton
         Provides the rest transforms and DOF values.
 
     Returns

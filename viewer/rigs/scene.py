@@ -209,9 +209,9 @@ class Actor:
 
         Parameters
         ----------
-        time : float, optional
+        time
             Seconds of its motion; all frames of the motion if omitted, one without a motion.
-        skinning : Skinning, optional
+        skinning
             Skinning method and options.
 
         Returns
@@ -248,7 +248,7 @@ class Actor:
 
         Parameters
         ----------
-        time : float, optional
+        time
             Seconds of its motion; all frames of the motion if omitted, one without a motion.
 
         Returns
@@ -274,7 +274,7 @@ class Actor:
 
         Parameters
         ----------
-        time : float
+        time
             Seconds of its motion.
 
         Returns

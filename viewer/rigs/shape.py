@@ -31,7 +31,7 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with or without blend shapes.
     weights : (N,)
         N <= S; missing weights are 0.
@@ -101,7 +101,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a mesh.
     positions : (V, 3)
         New rest vertices, figure units.

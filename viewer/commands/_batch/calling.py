@@ -73,30 +73,30 @@ def batch(
     out : str or path
         A folder, which mirrors the folders of the inputs, or a template, such as
         ``out/{parent}/{stem}.bvh``.
-    to : str
+    to
         Suffix of the outputs in a folder.
     options : sequence of str
         Options of the command, as on the command line; for ``diff``, the reference comes first.
     shared : sequence of str or path
         Files that are opened with every input; for a function, files that it reads.
-    workers : int, optional
+    workers
         Number of worker processes; 0 for this process. By default 0 for few inputs, otherwise one
         per core.
-    cluster : str
+    cluster
         ``local``, the address of a Dask scheduler, or ``slurm``; empty for this machine.
-    shard : str
+    shard
         ``I/N``: only every N-th input, starting with input I (0 to N - 1).
-    resume : bool
+    resume
         Whether to skip inputs that the report lists as done with the same content, options and
         version of the program.
-    force : bool
+    force
         Whether existing files may be replaced.
-    retries : int
+    retries
         Number of times an input is retried after its worker has failed.
-    timeout : float, optional
+    timeout
         Seconds per attempt; 0 for no limit. By default 600, without limit for ``"render"``.
         Applies to worker processes only.
-    memory : int, optional
+    memory
         Bytes that a worker may use.
     report : str or path
         File that gets one line of JSON per input; by default ``report.jsonl`` in ``out``.

@@ -56,9 +56,9 @@ def pose_errors(
 
     Parameters
     ----------
-    found : Actor
+    found
         The estimated motion, or a pose.
-    reference : Actor
+    reference
         The true one: as many joints and frames, at the same rate. Joints correspond by index.
     frames : (int, int), optional
         First frame and the frame after the last one, counted from 0; all by default.

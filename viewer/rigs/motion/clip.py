@@ -124,7 +124,7 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
 
     Parameters
     ----------
-    channel : Channel
+    channel
         The curve; without keys it is 0 everywhere.
     times : (...)
         Seconds.
@@ -149,13 +149,13 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
 
     Parameters
     ----------
-    clip : Clip
+    clip
         The motion.
-    skeleton : Skeleton
+    skeleton
         Provides the limits; the clip must fit the skeleton, see ``suits``.
-    time : float
+    time
         Seconds; before ``start`` and after ``end`` the curves extrapolate.
-    out : Pose
+    out
         Modified in place.
     """
     targets, values = evaluate_all(clip, np.array([time]))

@@ -79,9 +79,9 @@ def motion(actor: Actor, interpolate: bool = False) -> MotionArrays:
 
     Parameters
     ----------
-    actor : Actor
+    actor
         Actor that plays a motion of joints, such as a captured person.
-    interpolate : bool
+    interpolate
         Interpolate across gaps.
 
     Returns

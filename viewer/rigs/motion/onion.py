@@ -27,14 +27,14 @@ def onion(
 
     Parameters
     ----------
-    scene : Scene or Actor
+    scene
         What moves, which is not modified; actors without a motion are shown once.
     times : int or iterable of float
         Number of poses, evenly spaced over the motions, or their times on the scene's clock,
         seconds, in any order.
-    interpolate : bool
+    interpolate
         Interpolate across gaps of captures instead of omitting absent actors.
-    faintest : float
+    faintest
         Opacity of the earliest pose, 0 to 1.
 
     Returns

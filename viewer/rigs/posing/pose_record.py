@@ -100,11 +100,11 @@ def record_of(figure: Figure, pose: Pose, gender: str = "") -> PoseRecord:
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a skeleton.
-    pose : Pose
+    pose
         Pose of that figure.
-    gender : str
+    gender
         Gender of the body, as stated by its file; that of the figure if empty.
     """
     skeleton = figure.require_skeleton()
@@ -139,13 +139,13 @@ def apply_record(
 
     Parameters
     ----------
-    record : PoseRecord
+    record
         The record to apply.
-    figure : Figure
+    figure
         Figure with a skeleton.
-    pose : Pose
+    pose
         Modified, except for properties that are not in the record.
-    drop_excess : bool
+    drop_excess
         Ignore coefficients that the figure does not have, as in files of related models, instead of
         raising an error. They are always ignored in records with ``joint_rotations``.
 

@@ -138,9 +138,9 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a symmetric skeleton.
-    pose : Pose
+    pose
         Not modified.
 
     Returns

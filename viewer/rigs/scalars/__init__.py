@@ -126,9 +126,9 @@ class Scalar:
     ----------
     compute : callable
         Takes a ``Figure`` and its posed vertices (V, 3), and returns values (V,).
-    title : str
+    title
         Label in menus and the legend.
-    unit : str
+    unit
         ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
     kind : str
         ``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0.

@@ -116,11 +116,11 @@ def deform(
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a mesh. Without skeleton or skin the mesh is returned in the bind pose.
-    pose : Pose, optional
+    pose
         DOFs in lengths and radians; the pose stored in the file if omitted.
-    method : str or Skinning
+    method
         A key of ``METHODS``, or all skinning options.
 
     Returns
@@ -199,11 +199,11 @@ def deform_frames(
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with mesh, skeleton and skin.
     poses : sequence of F Pose
         Poses; all are shaped by the weights of the first.
-    skinning : Skinning, optional
+    skinning
         Options whose method must be ``"lbs"``.
 
     Returns
@@ -240,9 +240,9 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
 
     Parameters
     ----------
-    figure : Figure
+    figure
         Figure with a skeleton.
-    pose : Pose
+    pose
         DOFs in lengths and radians.
 
     Returns
