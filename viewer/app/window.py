@@ -73,41 +73,13 @@ def show(
     messages: Sequence[str] = (),
     live: Live | None = None,
 ) -> None:
-    """Open a window and return when it is closed.
+    """Open a window and return when it is closed; RenderError without usable OpenGL.
 
-    Parameters
-    ----------
-    scene
-        Scene to show; the user's edits change its poses.
-    camera
-        Initial camera; fitted to the scene if omitted.
-    options
-        Initial display settings.
-    paths : sequence of str or Path
-        Files of the scene, for the title and the list of recent files.
-    scale
-        Scale of the interface; the scale of the screen if omitted.
-    fit_distance
-        Whether the camera is kept fitted to the scene until the user moves it.
-    builders : sequence of Builder
-        Captures of the scene that have not been read completely yet.
-    plays
-        Whether motions play from the start.
-    motion
-        Settings with which the scene's motions were read.
-    shell
-        Window that is already open; a new one if omitted. It is closed at the end.
-    messages : sequence of str
-        Messages to show in the window.
-    live
-        What other programs may change in the window.
-
-    Raises
-    ------
-    NoDisplay
-        If there is no display.
-    RenderError
-        If there is no usable OpenGL.
+    ``camera`` fits the scene if omitted, and keeps fitting it if ``fit_distance``. ``paths``: files
+    of the scene, for the title and the recent files. ``builders``: its captures that are still
+    being read. ``motion``: settings with which its motions were read. ``scale`` of the interface:
+    that of the screen if omitted. ``shell``: a window that is already open, closed at the end.
+    ``live``: what other programs may change.
     """
     if shell is None:
         find_display()
