@@ -60,3 +60,13 @@ try:
     viewer.load("nothing.glb")
 except viewer.ViewerError as problem:
     print(problem)
+
+nothing: None = viewer.show(scene)
+with viewer.show(scene, block=False) as window:
+    still["left_knee"] = [0.1, 0, 0]
+    window.camera = {"azimuth": 30.0, "target": np.zeros(3)}
+    is_open: bool = window.is_open
+with viewer.connect(Path("window.json")) as live:
+    added: viewer.Actor = live.add(fig)
+    chosen: tuple[str, ...] = live.selection
+    seconds: float = live.time

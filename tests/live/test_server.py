@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import random
 import re
 import socket
@@ -15,6 +16,7 @@ from live_screen import can_undo, screen_at
 
 import viewer
 from viewer.errors import ViewerError
+from viewer.live.connection_file import file_path
 from viewer.live.messages import Message, packed, read, receiver
 from viewer.live.server import Server
 
@@ -288,14 +290,31 @@ def hello_of(path):
     return packed(Message("hello", {"version": 1, "token": token}))
 
 
-def test_error_of_the_thread_is_raised_by_update(screen, live, capsys):
+@pytest.mark.parametrize("name", ["pose", "placement"])
+def test_error_of_the_thread_is_raised_by_update(screen, live, capsys, name):
     actor = live.add(bar())
-    actor.pose.dofs = np.full(6, np.nan)
+    if name == "pose":
+        actor.pose.dofs = np.full(6, np.nan)
+    else:
+        actor.placement = "nowhere"
     deadline = time.monotonic() + 10
     while not live._problem and time.monotonic() < deadline:
         time.sleep(0.01)
-    with pytest.raises(ViewerError, match="finite"):
+    why = "finite" if name == "pose" else "nowhere"
+    with pytest.raises(ViewerError, match=why):
         live.update()
-    assert "finite" in capsys.readouterr().err
-    actor.pose.dofs = np.zeros(6)
+    assert why in capsys.readouterr().err
+    actor.pose.dofs, actor.placement = np.zeros(6), np.eye(4)
     live.update()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_folder_that_others_can_write_is_refused(tmp_path, monkeypatch):
+    monkeypatch.delenv("VIEWER_CONNECTION_FILE", raising=False)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    usual = file_path()
+    assert stat.S_IMODE(usual.parent.stat().st_mode) == 0o700
+    assert usual.is_relative_to(tmp_path)
+    usual.parent.chmod(0o777)
+    with pytest.raises(ViewerError, match="nobody else can write"):
+        file_path()

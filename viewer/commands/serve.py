@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     from viewer.live.vmc import Receiver, Sender
 
     settings = settings_of(ServeOptions, arguments)
-    find_display()
     receives, sends = _address("--vmc-in", settings.vmc_in), _address("--vmc-out", settings.vmc_out)
+    find_display()
     server = Server(settings.connection_file or None)
     live = Live(server)
     try:

@@ -214,3 +214,10 @@ def receiver(stream: socket.socket) -> Callable[[int], bytes]:
         return bytes(data)
 
     return receive
+
+
+def told_of(problem: Exception) -> str:
+    """Return the text of an error that another process or thread is to hear of."""
+    if isinstance(problem, ViewerError):
+        return str(problem)
+    return f"{type(problem).__name__}: {printable(problem, 300)}"

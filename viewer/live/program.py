@@ -24,7 +24,16 @@ from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RenderError, ViewerError
 from viewer.live.connection_file import file_path, read_file
-from viewer.live.messages import VERSION, Message, MessageError, Values, packed, read, receiver
+from viewer.live.messages import (
+    VERSION,
+    Message,
+    MessageError,
+    Values,
+    packed,
+    read,
+    receiver,
+    told_of,
+)
 from viewer.live.objects import pack, unpack
 from viewer.live.server import POSE
 from viewer.phrases import printable
@@ -269,15 +278,18 @@ class Live:
 
     def _follow(self) -> None:
         """Look for changes until the connection ends."""
-        while not self._is_over.wait(1.0 / _RATE):
+        due = time.monotonic()
+        while not self._is_over.wait(max(due - time.monotonic(), 0.0)):
+            # A look that took long is not made up for.
+            due = max(due + 1.0 / _RATE, time.monotonic())
             if self._problem:
                 continue  # until ``update`` has raised it
             try:
                 self.update()
-            except ViewerError as problem:
+            except Exception as problem:  # handed to the next call of ``update``
                 if self.is_open:
-                    self._problem = str(problem)
-                    sys.stderr.write(f"viewer: {problem}\n")
+                    self._problem = told_of(problem)
+                    sys.stderr.write(f"viewer: {self._problem}\n")
 
     def _leave(self) -> None:
         if self.is_open:

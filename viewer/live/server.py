@@ -34,6 +34,7 @@ from viewer.live.messages import (
     packed,
     read,
     receiver,
+    told_of,
 )
 from viewer.live.objects import pack, unpack
 from viewer.phrases import printable
@@ -221,7 +222,7 @@ class Server:
                 except Exception as problem:  # handed to the client, whose mistake it may be
                     self.counts.refused += 1
                     self.wake()
-                    client.sendall(packed(Message("error", {"text": _told(problem)})))
+                    client.sendall(packed(Message("error", {"text": told_of(problem)})))
                     if not is_known or isinstance(problem, BrokenStreamError):
                         return
                 else:
@@ -312,10 +313,3 @@ def _check(actor: Actor) -> None:
         posed, _ = deform(actor.figure, actor.pose)
         if not np.isfinite(posed).all():
             raise MessageError("expected finite vertices")
-
-
-def _told(problem: Exception) -> str:
-    """Return the text of an error for the client."""
-    if isinstance(problem, ViewerError):
-        return str(problem)
-    return f"{type(problem).__name__}: {printable(problem, 300)}"
