@@ -71,6 +71,8 @@ class Casters:
                 draw_instance_shapes(self.programs, instances, *how, count)
         # Over a skin, a skeleton is an overlay and casts no shadow.
         for group in self.lineup.joint_groups:
+            if shows_mesh(group.actors[0].figure, options):
+                continue
             skeleton = self.buffers.joint_group(group)
             program = joint_program(self.programs, skeleton, options, "", fragment)
             draw_joints(program, skeleton, skeleton.placement, view, options)

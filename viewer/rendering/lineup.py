@@ -165,7 +165,7 @@ class Lineup:
     crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
     """Actors whose meshes may be drawn together."""
     joint_crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
-    """Actors of which only the joints are drawn, which may be drawn together."""
+    """Actors whose joints may be drawn together."""
     drawn: list[Actor] = field(default_factory=list)
     """All drawn actors."""
     skeletons: list[Actor] = field(default_factory=list)
@@ -179,19 +179,20 @@ class Lineup:
     joint_groups: list[Group] = field(default_factory=list)
     """Groups of the crowds of joints, set by ``divide``."""
     alone: list[Actor] = field(default_factory=list)
-    """Drawn actors that are in no group."""
+    """Drawn actors that are in no group, or have a mesh that is in none."""
     skeletons_alone: list[Actor] = field(default_factory=list)
     """Drawn actors whose joints are drawn one by one."""
     beside: list[Actor] = field(default_factory=list)
     """Actors of groups of which something else is drawn one by one."""
 
-    def divide(self, groups: list[Group]) -> None:
+    def divide(self, groups: list[Group], options: DisplayOptions) -> None:
         """Divide the drawn actors into groups and those that are drawn one by one."""
         joints = [group for crowd in self.joint_crowds.values() for group in crowd.joint_groups()]
         is_divided = len(self.alone) == len(self.drawn) or self.groups or self.joint_groups
         if is_divided and (self.groups, self.joint_groups) == (groups, joints):
             return
-        together = {id(actor) for group in (*groups, *joints) for actor in group.actors}
+        without_mesh = [one for one in joints if not shows_mesh(one.actors[0].figure, options)]
+        together = {id(actor) for group in (*groups, *without_mesh) for actor in group.actors}
         jointed = {id(actor) for group in joints for actor in group.actors}
         self.groups, self.joint_groups = groups, joints
         self.alone = [actor for actor in self.drawn if id(actor) not in together]
@@ -272,13 +273,13 @@ def _crowds(
 def _joint_crowds(
     actors: Sequence[Actor], options: DisplayOptions, before: dict[CrowdKey, Crowd]
 ) -> dict[CrowdKey, Crowd]:
-    """Return crowds of opaque actors of which only the joints are drawn."""
+    """Return crowds of opaque actors whose joints are drawn."""
     if options.show == "binding":
         return {}
     groups: dict[CrowdKey, list[Actor]] = {}
     for actor in with_skeleton(actors, options):
         pose, figure = actor.own_pose, actor.figure
-        if pose is None or shows_mesh(figure, options) or options.opacity * actor.opacity != 1.0:
+        if pose is None or options.opacity * actor.opacity != 1.0:
             continue
         if figure.require_skeleton().n_joints <= _MOST_JOINTS:
             key = id(figure), pose.shape_weights.tobytes(), False
@@ -328,7 +329,7 @@ def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
 
 def with_skeleton(actors: Sequence[Actor], options: DisplayOptions) -> list[Actor]:
     """Return the actors whose joint boxes are drawn."""
-    # Among a thousand actors, the first condition is usually the last.
+    # The first condition excludes most actors, so it is the cheapest.
     wanted = options.show in ("skeleton", "both")
     return [
         actor

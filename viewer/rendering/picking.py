@@ -175,6 +175,7 @@ class PickPass:
         self, group: Group, numbers: dict[int, int], view: View, options: DisplayOptions
     ) -> None:
         skeleton = self._buffers.joint_group(group)
+        view = in_front(view) if shows_mesh(group.actors[0].figure, options) else view
         program = joint_program(self._programs, skeleton, options, "", "pick")
 
         def found(instance: int, _: int, point: Floats) -> Pick:

@@ -161,7 +161,8 @@ class Renderer:
             (actor, selected[1] if actor is chosen else -1) for actor in lineup.skeletons_alone
         ]
         for group in lineup.joint_groups:
-            self._draw_joint_group(group, view, options, chosen, selected[1])
+            if not shows_mesh(group.actors[0].figure, options):
+                self._draw_joint_group(group, view, options, chosen, selected[1])
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, 1.0)
@@ -177,6 +178,9 @@ class Renderer:
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self.late.draw_motion_paths(scene, view, options, target.size)
+        for group in lineup.joint_groups:
+            if shows_mesh(group.actors[0].figure, options):
+                self._draw_joint_group(group, view, options, chosen, selected[1], overlays=True)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
@@ -330,14 +334,21 @@ class Renderer:
         context.depth_func = "<"
 
     def _draw_joint_group(
-        self, group: Group, view: View, options: DisplayOptions, chosen: Actor | None, joint: int
+        self,
+        group: Group,
+        view: View,
+        options: DisplayOptions,
+        chosen: Actor | None,
+        joint: int,
+        overlays: bool = False,
     ) -> None:
+        # Over skins, all of them are a single layer: only the nearest joints are visible.
         skeleton = self.buffers.joint_group(group)
         numbers = [number for number, actor in enumerate(group.actors) if actor is chosen]
         if joint >= 0 and numbers:
             joint += numbers[0] * skeleton.n_joints
-        selected = joint if numbers else -1
-        self.joint_pass.draw(skeleton, skeleton.placement, view, options, selected)
+        how = joint if numbers else -1, skeleton.opacity(options) if overlays else 1.0, None
+        self.joint_pass.draw(skeleton, skeleton.placement, view, options, *how, overlays)
 
     def _draw_skeleton(
         self,

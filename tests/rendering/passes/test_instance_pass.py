@@ -222,7 +222,8 @@ def rows_of_arms(count: int, **parts) -> Scene:
         {"texture": False},
         {"shading": "normals"},
         {"shading": "checker", "cull": True},
-        {"show": "both", "flat": True},
+        {"show": "both", "flat": True, "skeleton_opacity": 1.0},
+        {"show": "both", "bones": "octahedra", "quality": "normal"},
         {"skinning": Skinning("dqs")},
     ],
     ids=str,
@@ -410,9 +411,27 @@ def test_skeletons_of_a_crowd_look_like_single_ones(offscreen, monkeypatch, work
     assert work["render"] - n_draws == parts * (FEWEST + 2 - 2)
 
 
-def test_picked_joints_of_a_crowd_are_those_of_their_actors(offscreen):
+def test_translucent_skeletons_over_skins_differ_only_where_they_overlap(offscreen, monkeypatch):
+    """Together they are one layer, of which only the nearest joints are visible."""
+    differ = []
+    for step in (0.0, 4.0):
+        scene, size, options = rows_of_arms(FEWEST), (200, 150), DisplayOptions(show="both")
+        for number, actor in enumerate(scene.actors):
+            actor.placement[1, 3] += step * number
+        camera, box = default_camera(scene, size), scene_box(scene)
+        together = offscreen.render(scene, size, camera, options, box)
+        with monkeypatch.context() as patch:
+            patch.setattr(lineup, "FEWEST", 100)
+            alone = offscreen.render(scene, size, camera, options, box)
+        differ.append((np.abs(together.astype(int) - alone).max(axis=-1) > 2).mean())
+    overlapping, apart = differ
+    assert 0.0 < overlapping < 0.01 and apart == 0.0
+
+
+@pytest.mark.parametrize("show", ["skeleton", "both"])
+def test_picked_joints_of_a_crowd_are_those_of_their_actors(offscreen, show):
     scene, size = crowd_of_skeletons(), (200, 150)
-    options = DisplayOptions(show="skeleton", bones="boxes")
+    options = DisplayOptions(show=show, bones="boxes")
     camera, box = default_camera(scene, size), scene_box(scene)
     view = view_of(camera, size, box)
     for number in (0, 4, 7):
@@ -478,10 +497,14 @@ def crowd(count: int) -> Scene:
     return Scene(actors)
 
 
-@pytest.mark.parametrize(("quality", "opacity"), [("draft", 1.0), ("normal", 1.0), ("draft", 0.6)])
-def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, quality, opacity):
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"quality": "normal"}, {"opacity": 0.6}, {"show": "both", "quality": "normal"}],
+    ids=str,
+)
+def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, changes):
     size, draws = (64, 48), {}
-    options = DisplayOptions(quality=quality, opacity=opacity)
+    options = DisplayOptions(**{"quality": "draft", **changes})
     for count in (10, 100):
         scene = crowd(count)
         box, camera = scene_box(scene), default_camera(scene, size)

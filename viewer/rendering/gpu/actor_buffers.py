@@ -130,7 +130,7 @@ class ActorBuffers:
     def line_up(self, actors: Sequence[Actor], options: DisplayOptions) -> Lineup:
         """Return the drawn actors of a scene, with crowds and groups that are up to date."""
         self._lineup = lineup(actors, options, self._lineup)
-        self._lineup.divide(self.groups(self._lineup, options))
+        self._lineup.divide(self.groups(self._lineup, options), options)
         self._joint_groups.keep_only(self._lineup.joint_groups)
         return self._lineup
 
