@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rendering.drawn_figures import random_figure, random_pose
 
-from viewer.exporters.html.motion import tracks_of
+from viewer.exporters.html.motion import _pack_fields, tracks_of
 from viewer.exporters.html.offsets import principal_fields
 from viewer.exporters.html.packing import Packer, unpacked
 from viewer.rigs.blendshapes import Correctives
@@ -124,3 +124,15 @@ def moved_vertex_by_vertex():
     offsets = np.zeros((27, figure.mesh.n_vertices, 3))
     offsets[np.arange(27), np.arange(27)] = random.normal(size=(27, 3))
     return replace(figure, correctives=Correctives(offsets))
+
+
+@pytest.mark.parametrize("sizes", [1.0, (0.01, 1.0)], ids=["even", "uneven"])
+def test_sums_of_rounded_fields_are_as_exact_as_asked_but_not_much_more(sizes):
+    random, error = np.random.default_rng(8), 1e-4
+    low, high = np.broadcast_to(sizes, 2)
+    weights = random.uniform(-1.0, 1.0, (50, 40)) * np.geomspace(low, high, 40)
+    fields, packer, motion = random.normal(size=(40, 600, 3)), Packer(), {}
+    _pack_fields(("weights", "fields"), weights, fields, error, packer, motion)
+    rows = unpacked(packer.items, packer.text())[motion["fields"]].reshape(600, 40, 3)
+    apart = np.abs(np.einsum("fk,vka->fva", weights, rows - np.moveaxis(fields, 0, 1)))
+    assert 0.5 * error < apart.max() < 1.1 * error

@@ -38,6 +38,8 @@ float32, stay below 1e-5 of the size."""
 _EQUAL = 1e-9  # relative difference of lengths that counts as none
 _NORMAL_TOLERANCE = 2e-3  # of unit normals: 0.1 degrees
 _COARSEST_WEIGHT = 0.01
+_DEVIATIONS = 5.0
+_SHARE_OF_FIELDS = 2.0  # in FINE: errors of displacements beside those of joints
 _MOST_NUMBERS = 30_000_000  # of a model's correctives that are compared with principal fields
 _COARSE, _FINEST = 2.0**-10, 2.0**-22  # limits of the step of quaternions and stretches
 _RIGID = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])  # stretch of a joint that does not scale
@@ -333,7 +335,8 @@ def _pack_surface(surface: RestSurface, fine: float, packer: Packer, motion: Jso
     if len(fields):
         weights = np.concatenate([each.weights for each in both], axis=1)
         motion["nShapes"] = len(surface.shapes.fields)
-        _pack_fields(("weights", "fields"), weights, fields, fine, packer, motion)
+        error = _SHARE_OF_FIELDS * fine
+        _pack_fields(("weights", "fields"), weights, fields, error, packer, motion)
     turns = surface.normal_fields
     if len(turns.fields):
         names = "normalWeights", "normalFields"
@@ -356,5 +359,13 @@ def _pack_fields(
     steps = np.full(count, _COARSEST_WEIGHT)
     np.divide(fine, np.sqrt(count) * largest, out=steps, where=largest > 0.0)
     motion[names[0]] = packer.add(weights, np.minimum(steps, _COARSEST_WEIGHT))
+    # A field that is rounded to steps s_k has errors of variance s_k^2 / 12, which its weight w_fk
+    # multiplies. With s_k = s / (r_k sqrt K) and r_k^2 the mean of w_fk^2, all fields contribute
+    # alike, and the sum has the deviation s / sqrt 12 in a usual frame, ``peak`` times that in the
+    # worst. One of a million errors is beyond five deviations.
+    usual = np.sqrt(np.square(weights).mean(axis=0))
+    used = np.where(usual > 0.0, usual, 1.0)
+    peak = np.sqrt(np.square(weights / used).mean(axis=1).max(initial=1.0))
+    coarse = fine * np.sqrt(12.0) / (_DEVIATIONS * peak * np.sqrt(count) * used)
     rows = np.moveaxis(fields, 0, 1).reshape(fields.shape[1], -1)
-    motion[names[1]] = packer.add(rows, fine / np.sqrt(count))
+    motion[names[1]] = packer.add(rows, np.repeat(coarse, 3))
