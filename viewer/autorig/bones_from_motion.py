@@ -19,7 +19,7 @@ from viewer.autorig.decomposition import Decomposition, DecompositionSettings, d
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted, rounded
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -29,9 +29,11 @@ from viewer.rigs.geometry.transform import affine_matrices, apply_transform
 from viewer.rigs.motion.moving_mesh import FrameErrors, MovingMesh, frame_errors, posed_rows
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
+from viewer.rigs.scalars import length_text
 from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skin import Skin, skin_from_entries
+from viewer.rigs.units import UNIT_NAMES
 
 # Pull of a joint towards the vertices that its two bones share, as a squared angle in radians:
 # bones that turn against each other by less than 0.1 (6 degrees) say too little about its place.
@@ -44,6 +46,8 @@ _SHARED = 1e-3
 # of the file if the file does not have it. Single precision may be coarser than the first.
 _PLACE, _LOST = 1e-6, 1e-3
 _FAR = 100.0  # distance from the origin, in sizes, at which single precision has 5 digits left
+
+_MOST_LINES = 100  # frames whose errors are printed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +146,73 @@ def read_back_errors(moving: MovingMesh, times: Floats, actor: Actor) -> tuple[F
     vertices = near[np.arange(len(first)), apart.argmin(axis=1)].astype(np.int32)
     lost = KDTree(first).query(rest)[0] > _LOST * moving.size
     return frame_errors(moving, placed, vertices), np.flatnonzero(lost).astype(np.int32)
+
+
+def frame_lines(moving: MovingMesh, errors: FrameErrors) -> list[Diagnostic]:
+    """Return the error of each frame, or of the worst of very many."""
+    rows = np.arange(moving.n_frames)
+    if len(rows) > _MOST_LINES:
+        rows = np.sort(np.argsort(-errors.rms, kind="stable")[:_MOST_LINES])
+    key = (
+        "X002.frame-error: frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
+        "({largest_percent} %) at vertex {vertex}"
+    )
+    lines = [note(key, **_errors_of(moving, errors, row)) for row in rows.tolist()]
+    if len(rows) < moving.n_frames:
+        n = counted(moving.n_frames - len(rows), "frame", "is", "are")
+        lines.append(note("X002.other-frames: {n} closer than these", n=n))
+    return lines
+
+
+def _errors_of(moving: MovingMesh, errors: FrameErrors, row: int) -> dict[str, object]:
+    """Return the values of a message about a frame."""
+    figure, size = moving.figure, moving.size
+    rms, largest = float(errors.rms[row]), float(errors.largest[row])
+    return {
+        "frame": int(moving.numbers[row]),
+        "rms": _length(figure, rms),
+        "rms_percent": rounded(100.0 * rms / size),
+        "largest": _length(figure, largest),
+        "largest_percent": rounded(100.0 * largest / size),
+        "vertex": int(errors.vertices[row]),
+    }
+
+
+def error_lines(
+    moving: MovingMesh, errors: FrameErrors, missing: Ints, how: DecompositionSettings
+) -> list[Diagnostic]:
+    """Return the error of all frames together, and what it does not count."""
+    figure, size, worst = moving.figure, moving.size, errors.worst
+    total = {
+        "total": _length(figure, errors.total),
+        "total_percent": rounded(100.0 * errors.total / size),
+    }
+    key = (
+        "X002.sequence-error: error of the skinned mesh: RMS {total} ({total_percent} % of the "
+        "size); worst frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
+        "({largest_percent} %)"
+    )
+    lines = [note(key, **_errors_of(moving, errors, worst), **total)]
+    over = 100.0 * float(errors.rms[worst]) / size
+    if not how.bones and over > how.tolerance:
+        key = (
+            "X002.over-tolerance: more than the tolerance of {tolerance:g} %: {bones} finds more "
+            "bones, {most} uses more for each vertex"
+        )
+        values = {
+            "bones": Remedy("a number of Bones", "--bones N"),
+            "most": Remedy("Max. influences", "--max-influences N"),
+        }
+        lines.append(note(key, tolerance=how.tolerance, **values))
+    if len(missing):
+        n = counted(len(missing), "vertex", "is", "are")
+        lines.append(note("X003.loose-vertices: {n} without a face and not in the file", n=n))
+    return lines
+
+
+def _length(figure: Figure, length: float) -> str:
+    """Return a length in the figure's unit; a plain number if that is unknown."""
+    return length_text(figure, length) if figure.unit in UNIT_NAMES else rounded(length)
 
 
 def _far_place(rest: Floats) -> Floats | None:

@@ -37,7 +37,7 @@ from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, changed, settings_of
 from viewer.commands.convert import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, note
+from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, UnsupportedFormatError, ViewerError
 from viewer.exporters import (
@@ -59,12 +59,11 @@ from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import counted, printable, rounded
 from viewer.progress import part_of_work
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.moving_mesh import (
-    FrameErrors,
     MovingMesh,
     frame_errors,
     moving_mesh,
@@ -73,13 +72,10 @@ from viewer.rigs.motion.moving_mesh import (
 from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.pose import Pose
-from viewer.rigs.scalars import length_text
 from viewer.rigs.scene import Actor, Scene, scene_of
 from viewer.rigs.skinning import joint_matrices, posed_mesh
-from viewer.rigs.units import UNIT_NAMES
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
-_MOST_LINES = 100  # frames whose errors are printed
 # Landmarks.
 _FARTHEST = 1e9  # largest coordinate, in any unit
 _LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
@@ -365,7 +361,12 @@ def _sequence(files: Sequence[str]) -> list[Path]:
 
 def _rig_moving(arguments: argparse.Namespace, sequence: list[Path]) -> int:
     """Find the bones of a mesh that moves, write them, and print the errors of all frames."""
-    from viewer.autorig.bones_from_motion import read_back_errors, rig_motion
+    from viewer.autorig.bones_from_motion import (
+        error_lines,
+        frame_lines,
+        read_back_errors,
+        rig_motion,
+    )
 
     _check_only_motion(arguments)
     output = None if arguments.output is None else Path(arguments.output)
@@ -402,7 +403,8 @@ def _rig_moving(arguments: argparse.Namespace, sequence: list[Path]) -> int:
             errors = frame_errors(moving, posed_rows(made.actor.figure, made.clip, made.times))
             missing = np.zeros(0, dtype=np.int32)
     stream = sys.stdout if output is None else summary_stream(output)
-    for each in (*made.lines, *written, *error_lines(moving, errors, missing, how)):
+    lines = *frame_lines(moving, errors), *error_lines(moving, errors, missing, how)
+    for each in (*made.lines, *written, *lines):
         note_found(each)
         print(each, file=stream)
     if arguments.view:
@@ -450,63 +452,6 @@ def _moving_figure(arguments: argparse.Namespace, frames: Frames) -> MovingMesh:
             "file, or a mesh file for each frame"
         )
     return moving_mesh(moving[0], frames.fps, arguments.bind_frame)
-
-
-def error_lines(
-    moving: MovingMesh, errors: FrameErrors, missing: Ints, how: DecompositionSettings
-) -> list[Diagnostic]:
-    """Return the error of each frame, or of the worst of very many, and of all together."""
-    figure, size, numbers = moving.figure, moving.size, moving.numbers.tolist()
-    worst = errors.worst
-
-    def values(row: int) -> dict[str, object]:
-        rms, largest = float(errors.rms[row]), float(errors.largest[row])
-        return {
-            "frame": numbers[row],
-            "rms": _length(figure, rms),
-            "rms_percent": rounded(100.0 * rms / size),
-            "largest": _length(figure, largest),
-            "largest_percent": rounded(100.0 * largest / size),
-            "vertex": int(errors.vertices[row]),
-        }
-
-    rows = np.arange(moving.n_frames)
-    if len(rows) > _MOST_LINES:
-        rows = np.sort(np.argsort(-errors.rms, kind="stable")[:_MOST_LINES])
-    key = (
-        "X002.frame-error: frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
-        "({largest_percent} %) at vertex {vertex}"
-    )
-    lines = [note(key, **values(row)) for row in rows.tolist()]
-    if len(rows) < moving.n_frames:
-        n = counted(moving.n_frames - len(rows), "frame", "is", "are")
-        lines.append(note("X002.other-frames: {n} closer than these", n=n))
-    total = {
-        "total": _length(figure, errors.total),
-        "total_percent": rounded(100.0 * errors.total / size),
-    }
-    key = (
-        "X002.sequence-error: error of the skinned mesh: RMS {total} ({total_percent} % of the "
-        "size); worst frame {frame}: RMS {rms} ({rms_percent} %), largest {largest} "
-        "({largest_percent} %)"
-    )
-    lines.append(note(key, **values(worst), **total))
-    over = 100.0 * float(errors.rms[worst]) / size
-    if not how.bones and over > how.tolerance:
-        key = (
-            "X002.over-tolerance: more than the tolerance of {tolerance:g} %: --bones N finds more "
-            "bones, --max-influences N uses more for each vertex"
-        )
-        lines.append(note(key, tolerance=how.tolerance))
-    if len(missing):
-        n = counted(len(missing), "vertex", "is", "are")
-        lines.append(note("X003.loose-vertices: {n} without a face and not in the file", n=n))
-    return lines
-
-
-def _length(figure: Figure, length: float) -> str:
-    """Return a length in the figure's unit; a plain number if that is unknown."""
-    return length_text(figure, length) if figure.unit in UNIT_NAMES else rounded(length)
 
 
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:

@@ -11,6 +11,8 @@ from app.curves.plotted import clip_text
 from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.tiny import write_rig
+from autorig.rigged_shapes import turn
+from autorig.test_binding import box, joined
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
@@ -349,3 +351,40 @@ def test_target_that_does_not_overlap_the_template_shows_a_message(drive):
     hand.click("Run")
     hand.finish_job()
     assert hand.state.error != "" and names(hand) == ["point", "arm"]
+
+
+def test_frames_of_a_moving_mesh_become_bones(rigging, tmp_path):
+    """Two boxes, of which the second one turns by 10 degrees a frame about the edge between."""
+    mesh = joined(box([0, 0, 0], [2, 1, 1], (2, 2, 2)), box([2, 0, 0], [4, 1, 1], (2, 2, 2)))
+    is_second = np.arange(mesh.n_vertices) >= mesh.n_vertices // 2
+    faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.triangles + 1).tolist())
+    frames, paths = [], []
+    for number in range(5):
+        points = mesh.positions.copy()
+        edge = np.array([2.0, 0.0, 0.0])
+        points[is_second] = (points[is_second] - edge) @ turn([0, 0, 1], 0.17 * number).T + edge
+        frames.append(points)
+        paths.append(tmp_path / f"frame_{number}.obj")
+        paths[-1].write_text("".join("v {} {} {}\n".format(*each) for each in points) + faces)
+    hand = rigging()
+    hand.click("Add mesh…")
+    hand.step(2)
+    dialog = hand.state.of(Files).dialog
+    assert not dialog.is_single
+    hand.state.of(Rigging).choices.bones = 2
+    dialog.done(hand.state, paths)
+    hand.state.of(Files).dialog = None
+    hand.finish_job()
+    actor = hand.state.scene.actors[-1]
+    assert hand.state.actor is actor and actor.name == "frame"
+    assert actor.figure.skeleton.n_joints in (2, 3)  # the boxes share no vertices
+    assert hand.says("error of the skinned mesh: RMS")
+    hand.state.clock.playing = False
+    for number in (0, 3, 4):
+        hand.state.clock.seek(number / actor.clip.frame_rate)
+        hand.step(2)
+        assert_allclose(deform(actor.figure, actor.pose)[0], frames[number], atol=1e-4)
+    assert [edit.text for edit in unsaved_edits(hand.state)] == ["frame: motion"]
+    dialog.done(hand.state, [paths[0], tmp_path / "skin.png"])
+    hand.finish_job()
+    assert "skin.png: expected frames of one mesh, .obj or .ply" in hand.state.error

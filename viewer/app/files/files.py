@@ -261,10 +261,13 @@ def ask_for_files(
     title: str = "Open files",
     suffixes: tuple[str, ...] = (),
     is_single: bool = False,
+    more: Callable[[AppState, FileDialog], None] | None = None,
+    more_rows: float = 0.0,
 ) -> None:
-    """Ask for files, which are opened unless another action is given."""
+    """Ask for files, which are opened unless another action is given; see ``FileDialog``."""
     start = folder_of(state.paths)
     dialog = FileDialog(start, act or open_files, "open", title, suffixes, is_single=is_single)
+    dialog.more, dialog.more_rows = more, more_rows
     state.of(Files).dialog = dialog
 
 

@@ -26,6 +26,7 @@ from viewer.app.core.widgets import (
     slider,
     warning,
 )
+from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_for_files
 from viewer.app.rigging import joint_editing
 from viewer.app.rigging.placing import (
@@ -157,9 +158,9 @@ def _draw_sources(state: AppState) -> None:
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
     if button(state, "Add mesh…", why):
-        title = f"Add a mesh to rig: {', '.join(MESHES)}"
-        ask_for_files(state, start_adding, title, MESHES, is_single=True)
-    explain("add a mesh without a rig to this scene")
+        title = f"Add a mesh to rig, or all frames of one that moves: {', '.join(MESHES)}"
+        ask_for_files(state, start_adding, title, MESHES, more=_draw_motion, more_rows=3.0)
+    explain("add a mesh without a rig to this scene, or find bones in the frames of a moving one")
     with disabled(state, why):
         key = choice(state, "Template", view.template_key, template_texts(state))
     if key != view.template_key:
@@ -195,6 +196,16 @@ def _draw_sources(state: AppState) -> None:
         text = f"{n_joints} joints, {size}, {pose}"
     imgui.text_disabled(text)
     imgui.pop_text_wrap_pos()
+
+
+def _draw_motion(state: AppState, _dialog: FileDialog) -> None:
+    """Draw the settings of bones that are found in the motion of several files."""
+    choices = state.of(Rigging).choices
+    text = "number of bones for the frames of a moving mesh; 0 for as many as the tolerance needs"
+    draw_setting(state, "Bones", choices, "bones", text)
+    why = "" if choices.bones == 0 else "for a number of bones of 0"
+    text = "RMS error of the worst frame, relative to the size of the mesh"
+    draw_setting(state, "Tolerance", choices, "tolerance", text, why)
 
 
 def _add_template(state: AppState) -> None:

@@ -16,6 +16,7 @@ from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings, TemplateScale
 from viewer.autorig.correspondence import MAX_ANGLE
+from viewer.autorig.decomposition import MOST_BONES, DecompositionSettings
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import (
     BINDING,
@@ -65,6 +66,7 @@ _FILE = "file"
 SHAPE = "shape"
 """Key of the template that is a skeleton found in the target's shape."""
 _USUAL, _FOUND = TransferSettings(), SkeletonSettings()
+_OF_MOTION = DecompositionSettings()
 _AXES = {"": "automatic", **{axis: axis for axis in AXES}}
 _SCALES: dict[TemplateScale, str] = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 _posed: Memo[Skin, Mesh] = Memo()
@@ -185,6 +187,15 @@ class RigChoices:
         _FOUND.joint_spacing, limits=(0.1, 10.0), unit="%.2f", logarithmic=True
     )
     """Symmetry and distance of joints of a skeleton that is found in the target's shape."""
+    bones: int = setting(_OF_MOTION.bones, limits=(0, MOST_BONES))
+    tolerance: float = setting(
+        _OF_MOTION.tolerance,
+        limits=DecompositionSettings.__dataclass_fields__["tolerance"].metadata["limits"],
+        unit="%.3f %%",
+        logarithmic=True,
+    )
+    """Number of bones that are found in the motion of a mesh, 0 for as many as the tolerance needs;
+    and the tolerance in percent of its size."""
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import aligned_template, placing_now, target_place
 from viewer.app.rigging.results import compare, put_results, show_match
@@ -39,10 +40,12 @@ from viewer.autorig.alignment.surface_alignment import (
     alignment_lines,
     stated_up,
 )
+from viewer.autorig.bones_from_motion import error_lines, rig_motion
 from viewer.autorig.confidence import doubts, judge
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.curve_skeleton import find_skeleton
+from viewer.autorig.decomposition import DecompositionSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import SkeletonSettings, TransferMethod, TransferSettings
@@ -51,14 +54,16 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.loading import load
+from viewer.loading.mesh_sequence import SEQUENCES, read_mesh_sequence
 from viewer.loading.placing import placed_like
-from viewer.phrases import printable
+from viewer.phrases import counted, one_of, printable
 from viewer.progress import part_of_work, report
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.ray_hit import surface_point
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
+from viewer.rigs.motion.moving_mesh import frame_errors, posed_rows
 from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.scene import Actor, free_title
 from viewer.rigs.shape import shaped
@@ -110,7 +115,10 @@ def finish_work(state: AppState) -> None:
 
 
 def start_adding(state: AppState, paths: Sequence[Path]) -> None:
-    """Read a mesh to rig, and add it to the scene."""
+    """Read a mesh to rig, and add it to the scene; find bones in the motion of several files."""
+    if len(paths) > 1:
+        _start_finding_bones(state, paths)
+        return
     path = paths[0]
 
     def act() -> _Finish:
@@ -138,6 +146,41 @@ def start_adding(state: AppState, paths: Sequence[Path]) -> None:
         return finish
 
     begin_work(state, f"Reading {printable(path.name, 60)}", act)
+
+
+def _start_finding_bones(state: AppState, paths: Sequence[Path]) -> None:
+    """Read the frames of a mesh, find its bones, and add it with their motion to the scene."""
+    choices = state.of(Rigging).choices
+    most = choices.max_influences or DecompositionSettings().max_influences
+    how = DecompositionSettings(choices.bones, choices.tolerance, most)
+
+    def act() -> _Finish:
+        for path in paths:
+            if path.suffix.lower() not in SEQUENCES:
+                kinds = one_of(SEQUENCES)
+                raise RigError(f"{printable(path)}: expected frames of one mesh, {kinds}")
+        with part_of_work("Reading", (0.0, 0.2)):
+            moving, notes = read_mesh_sequence(paths)
+        with part_of_work("Finding bones", (0.2, 0.9)):
+            made = rig_motion(moving, how)
+        with part_of_work("Measuring the error", (0.9, 1.0)):
+            errors = frame_errors(moving, posed_rows(made.actor.figure, made.clip, made.times))
+        lines = *notes, *made.lines, *error_lines(moving, errors, np.zeros(0, np.int32), how)
+
+        def finish(state: AppState) -> None:
+            actor, actors = made.actor, state.scene.actors
+            actor.called = free_title(actors, actor.title)
+            state.say(*placed_like(state.scene, actor), *lines)
+            actors.append(actor)
+            state.paths = (*state.paths, *paths)
+            state.of(SavedWork).edited.add(made.clip)  # its export contains the rig, too
+            state.choose_actor(len(actors) - 1)
+            state.framing.restart()
+            state.clock.playing = True
+
+        return finish
+
+    begin_work(state, f"Finding bones in {counted(len(paths), 'frame')}", act, "bones")
 
 
 def start_reading(state: AppState, paths: Sequence[Path] = (), then: _Finish | None = None) -> None:
