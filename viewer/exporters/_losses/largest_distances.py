@@ -126,6 +126,13 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     return Apart(_joint(first, second, rows, others, far[0], least), vertex, looked, len(rows))
 
 
+def largest(first: Side, second: Side, rows: Rows) -> Floats:
+    """Return the largest distance of vertices, or of joints without a mesh, in each pose: (F,)."""
+    if first.body is None or second.body is None:
+        return heights(first, second, rows, rows)[0]
+    return _vertices(first, second, rows, rows, np.arange(len(rows)))[:, 0]
+
+
 def evenly(count: int, most: int) -> Rows:
     """Return at most ``most`` evenly spaced indices of ``count`` items, with both ends."""
     return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)

@@ -14,8 +14,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note
-from viewer.exporters._losses.largest_distances import negligible
-from viewer.exporters._losses.posed_bodies import Side, vertices
+from viewer.exporters._losses.largest_distances import evenly, largest, negligible
 from viewer.exporters.gltf.body import Body, Built, add_body, body_of
 from viewer.exporters.gltf.document import Document, text_of
 from viewer.exporters.gltf.keyed import Clips, first_time
@@ -47,7 +46,6 @@ from viewer.rigs.skinning import Skinning
 # Maximum number of compared vertices over all times: takes about two seconds.
 _MOST_VERTICES = 4_000_000
 _FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
-_BLOCK = 64  # number of times per block
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,11 +225,11 @@ def _clip_losses(
     found = _sampled(written, figure, pose, clips, min(_MOST, max(_FEWEST, each)))
     written = replace(written, keys=found.keys)
     expected, read = sides(written, figure, found.frames, how, body.shape)
-    distances = _distances(expected, read(None), len(found.times))
-    row = int(distances.argmax())
-    least = negligible(figure, found.frames, np.arange(len(found.times)))
-    causes: list[Phrase] = []
     rows = np.arange(len(found.times))
+    distances = largest(expected, read(None), rows)
+    row = int(distances.argmax())
+    least = negligible(figure, found.frames, rows)
+    causes: list[Phrase] = []
     if distances[row] > least and written.meshes:
         causes = causes_of(figure, found.frames, rows, how, body.shape, body.influences, least)
     place: Phrase | str = ""
@@ -259,24 +257,6 @@ def _clip_losses(
     return notes + first_set_note(expected, read, figure, rows, least, body.influences)
 
 
-def _distances(expected: Side, found: Side, count: int) -> Floats:
-    """Return the largest distance at each time: (F,)."""
-    distances = np.zeros(count)
-    for start in range(0, count, _BLOCK):
-        rows = np.arange(start, min(start + _BLOCK, count))
-        poses, others = expected.poses(rows), found.poses(rows)
-        one, other = poses.places, others.places
-        if expected.body is not None and found.body is not None:
-            other = vertices(found.body, others)
-            if expected.exact is not None:
-                one = np.stack([expected.exact(int(row)) for row in rows])
-            else:
-                one = vertices(expected.body, poses)
-        if one.shape[1]:
-            distances[rows] = np.linalg.norm(one - other, axis=2).max(axis=1)
-    return distances
-
-
 def _sampled(
     written: Written, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
 ) -> _Samples:
@@ -288,8 +268,7 @@ def _sampled(
     for index, (clip, keyed) in enumerate(zip(clips, animations, strict=True)):
         times = np.unique(np.concatenate([channel.times for channel in keyed]))
         times = np.union1d(times, 0.5 * (times[1:] + times[:-1]))
-        chosen = np.linspace(0, len(times) - 1, min(most, len(times))).round().astype(int)
-        times = times[chosen]
+        times = times[evenly(len(times), most)]
         own = times + first_time(clip)
         frames.append(frames_of(figure, clip, own, pose))
         moved.append((len(seconds), _keys_at(keyed, times)))
