@@ -255,6 +255,12 @@ def locked() -> Figure:
     return skeleton_with(dof_limits=limits)
 
 
+def limited_in_degrees() -> Figure:
+    limits = column().skeleton.dof_limits.copy()
+    limits[8] = -10.0, 140.0
+    return skeleton_with(dof_limits=limits)
+
+
 def with_unused() -> Figure:
     figure = column()
     mesh = figure.mesh
@@ -322,6 +328,7 @@ FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     "not affine": (lambda: bound(1, not_affine()), "B006", "joints", [1]),
     "pose outside limits": (posed_outside, "S004", "joints", [1]),
     "locked": (locked, "S005", "joints", [1]),
+    "limits in degrees": (limited_in_degrees, "S014", "joints", [1]),
     "same names": (lambda: skeleton_with(names=("foot", "foot")), "S006", "joints", [0, 1]),
     "no name": (lambda: skeleton_with(names=("foot", "")), "S007", "joints", [1]),
     "two roots": (rooted, "S008", "joints", [0, 1]),

@@ -14,9 +14,11 @@ from viewer.phrases import agree, counted, listed, quoted, rounded
 from viewer.rigs.inspection.faults import UNIT_ROTATION
 from viewer.rigs.pose import Pose
 from viewer.rigs.posing.dof_text import beyond_text
-from viewer.rigs.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, dof_labels, joint_labels, shown_joints
 
 _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
+# No joint rotates by more than two turns, and limits of more than two turns in degrees mean none.
+_TURNS = 4.0 * np.pi, 720.0
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -129,6 +131,22 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator
                 at=("joints", int(skeleton.dof_joints[worst])),
                 are=agree(len(outside), "is outside its", "are outside their"),
             )
+    rotates = skeleton.dof_kinds >= FIRST_ROTATION
+    sizes = np.where(rotates[:, None], np.abs(skeleton.dof_limits), 0.0)
+    degrees = np.flatnonzero(((sizes > _TURNS[0]) & (sizes <= _TURNS[1])).any(axis=1))
+    if len(degrees):
+        first = int(degrees[0])
+        yield subject.found(
+            "S014.limits: {n} limits of more than two turns, which look like degrees (first: "
+            "{dof}, {low} to {high})",
+            n=counted(len(degrees), "rotation", "has", "have"),
+            dof=dof_labels(skeleton)[first],
+            low=rounded(float(low[first])),
+            high=rounded(float(high[first])),
+            part="skeleton",
+            joints=np.unique(skeleton.dof_joints[degrees]),
+            at=("joints", int(skeleton.dof_joints[first])),
+        )
     locked = np.flatnonzero(skeleton.locked)
     if len(locked):
         labels = dof_labels(skeleton)
