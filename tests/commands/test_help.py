@@ -60,6 +60,7 @@ def test_option_groups_follow_the_order_of_work(command, titles):
 
 USAGES = {
     "view": "[FILES ...] [options]",
+    "serve": "[FILES ...] [options]",
     "render": "[FILES ...] -o FILE [options]",
     "convert": "[FILES ...] -o FILE [options]",
     "batch": "JOB PATHS [-o OUT] [options of the job] [options]",
