@@ -8,6 +8,7 @@ import re
 import socket
 import stat
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path
 from viewer.live.messages import Message, packed, read, receiver
 from viewer.live.server import Server
+from viewer.rigs.blendshapes import BlendShapes
 
 QUARTER = math.pi / 2
 
@@ -147,6 +149,27 @@ def test_figure_is_exchanged(screen, live):
     live.update()
     assert screen.state.scene.actors[-1].figure.mesh.n_vertices == 7561
     assert len(screen.state.scene.actors) == 2
+
+
+class Upwards:
+    """Shapes that a model computes: the weight is a displacement along y."""
+
+    def displacement(self, weights):
+        return np.tile([0.0, weights[:1].sum(), 0.0], (3, 1))
+
+    def joint_displacement(self, weights):
+        return np.tile([0.0, weights[:1].sum(), 0.0], (2, 1))
+
+
+def test_shapes_that_a_model_computes_are_sent_as_their_result(screen, live):
+    shapes = BlendShapes(("height",), np.ones((1, 3, 3)), space=Upwards())
+    actor = live.add(replace(bar(), blend_shapes=shapes))
+    for height in (2.0, 3.0):
+        actor.pose.shape_weights = np.array([height])
+        actor["joint_1"] = [0.0, 0.0, QUARTER]
+        live.update()
+        screen.wait(is_at(screen, [1.0, height + 1.0, 0.0]))
+    assert screen.state.scene.actors[-1].figure.blend_shapes is None
 
 
 def test_scene_is_replaced_and_followed(screen, live):
