@@ -25,6 +25,7 @@ from viewer.autorig.weights.weight_transfer import (
     nearest_weights,
     transferred_weights,
 )
+from viewer.progress import receiving
 from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.skin import Skin, skin_from_entries
 
@@ -107,9 +108,7 @@ def _weights(target: made.Target, method: str):
     if method == "nearest":
         return nearest_weights(target.template, skin, target.positions)
     template = Template(target.template, target.template_triangles)
-    return transferred_weights(
-        template, skin, target.positions, target.triangles, WeightSettings(), lambda *_: None
-    )
+    return transferred_weights(template, skin, target.positions, target.triangles, WeightSettings())
 
 
 def _whole_by_axes(target: made.Target, method: str):
@@ -140,14 +139,15 @@ def _times(figure) -> None:
     print(f"time for {count} vertices on {len(target.template)}; one k-d tree query {query:.2f} s")
     steps: list[tuple[float, str]] = [(time.perf_counter(), "template")]
 
-    def report(fraction: float, what: str) -> None:
-        if what != steps[-1][1]:
+    def receive(done: int, total: int, unit: str, what: str) -> None:
+        if what and what != steps[-1][1]:
             steps.append((time.perf_counter(), what))
 
     template = Template(target.template, target.template_triangles)
-    transferred_weights(
-        template, _skin(target), target.positions, target.triangles, WeightSettings(), report
-    )
+    with receiving(receive):
+        transferred_weights(
+            template, _skin(target), target.positions, target.triangles, WeightSettings()
+        )
     ends = [*(at for at, _ in steps[1:]), time.perf_counter()]
     for (start, what), end in zip(steps, ends, strict=True):
         print(f"  {what:<32} {end - start:6.2f} s")
