@@ -1,13 +1,15 @@
 """Alignment with pose and proportions: people with lowered arms, of other sizes, facing away."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from autorig.rigged_shapes import arm, mesh_of
 from numpy.testing import assert_allclose
 
-from viewer.autorig.alignment import posed_alignment
+from viewer.autorig.alignment import pose_fit, posed_alignment
+from viewer.autorig.alignment.anatomy_fit import FADED, start_of_landmarks
 from viewer.autorig.alignment.pose_fit import Fitted
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
@@ -114,6 +116,27 @@ def test_known_scales_are_not_searched():
     assert_allclose(asked.alignment.similarity.linear, np.diag([1.3, 1.0, 0.8]), atol=0.003)
     known, _ = aligned(figure, target, fits=False, scale="none")
     assert known.lines == ()
+
+
+def test_long_arms_and_wide_hips_that_were_found_are_kept(monkeypatch):
+    monkeypatch.setattr(pose_fit, "_VERTICES", 150)
+    monkeypatch.setattr(pose_fit, "_ROUNDS", 18)
+    figure, factors = load(bundled_body()).actors[0].figure, np.array([1.2, 1.0, 0.9])
+    pose = rest_pose(figure.skeleton)
+    posed = deform(figure, pose)[0]
+    target, triangles = posed * factors, figure.mesh.triangles
+    job = posed_alignment._job(figure, pose, target, triangles, AlignmentSettings(samples=60))
+    joints = joint_matrices(figure, pose)[:, :3, 3]
+    known = np.stack([joints, joints * factors], axis=1)
+    still = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
+    marked, start, marks = start_of_landmarks(figure, pose, posed, known, still)
+    # As estimates from the anatomy, they are not known to be exact.
+    marks = replace(marks, kept=np.full(len(joints), FADED))
+    found = posed_alignment._fitted_marks(job, marked, start, marks)
+    places = found.alignment.similarity.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    # 1.3 % apart if all that the surface does not show is as in the template again.
+    size = np.ptp(target, axis=0).max()
+    assert np.linalg.norm(places - joints * factors, axis=1).mean() < 0.009 * size
 
 
 def bent(angle):

@@ -302,9 +302,12 @@ def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> Pos
     found = _unmarked(job, state)
     if misfit(found.alignment, False) > _POOR:
         return found
-    # The surface of a similar figure is a better guide to its joints than the anatomy, and the
-    # template is a better guide to what the surface does not show, such as the joints of the spine.
+    # The surface of a similar figure is a better guide to its joints than the anatomy. What the
+    # surface does not show, such as the joints of the spine, bends as in the template. Of lengths
+    # and girths, template and anatomy are two estimates with errors of similar size: the mean of
+    # their logarithms is kept. From the template's alone, wide bodies would become narrower again.
     since = start_of(marked, job.pose, state.similarity)
+    since = replace(since, grown=0.5 * state.grown)
     kept = marks.chosen(is_landmark)
     if kept is None:
         marked, state = job.template, _of_template(job, state)
