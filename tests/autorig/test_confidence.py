@@ -8,6 +8,7 @@ from autorig.rigged_shapes import arm, mesh_of
 
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.anatomy import Limb, LimbPair
 from viewer.autorig.confidence import Body, confidence, doubts, findings, judge, refusal
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import TransferSettings
@@ -93,6 +94,21 @@ def test_bones_outside_the_template_say_nothing_about_the_target():
     keys = {finding.sentence[5:].split(":")[0] for finding in found}
     assert "volume" in keys and not keys & {"inside", "depth"}
     assert confidence(found) == 1.0
+
+
+def test_legs_that_leave_their_bones_are_counted():
+    # Bones are along x. One leg follows them; the other comes down along y, 2 long, and follows
+    # them for 1 only. Of its path from 0.45, after the foot, 12 of 26 points are within its radius.
+    straight = np.linspace([2.0, 0, 0], [0, 0, 0], 21)
+    bent = np.concatenate([np.linspace([1.0, 2, 0], [1, 0, 0], 21), straight[11:]])
+    limbs = [
+        Limb(points, np.full(len(points), 0.15), points[-1], 2.0) for points in (straight, bent)
+    ]
+    pairs = LimbPair((limbs[0], limbs[0])), LimbPair((limbs[0], limbs[1]))
+    for legs, expected in ((pairs[:1], 1.0), (pairs, 0.5 + 6 / 26)):
+        found = findings(body(), body(), PARENTS, alignment(), legs)
+        (value,) = (each.value for each in found if each.sentence.startswith("R017.legs:"))
+        assert value == pytest.approx(expected)
 
 
 def test_lengths_are_relative_to_the_median():

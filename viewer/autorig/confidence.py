@@ -4,7 +4,8 @@ The surface of a template can be pressed into any shape, so a small distance bet
 says little. A rig is right if the limbs of the template are where the target has limbs:
 
 - the surfaces meet, from the target to the template and back, more closely if no limbs were found;
-- bones are inside the solid, as deep as in the template;
+- bones are inside the solid, as deep as in the template, and along the middle of its legs: those
+  of a bird or of a robot may bend where a person's do not;
 - the solid is as thick as that of the template: a picture cut out of cardboard is not;
 - bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
@@ -24,6 +25,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.autorig.alignment.surface_alignment import PART, AlignedBy, Alignment, misfit
+from viewer.autorig.anatomy import LimbPair, arc_lengths
 from viewer.autorig.solid import Solid, solid_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
@@ -51,6 +53,7 @@ _REMEDY = (
 _FOUND_LIMBS, _NO_LIMBS = (0.045, 0.02), (0.03, 0.01)
 _BEND = np.radians(40.0)  # rotation of every joint in the test pose
 _ALONG = np.linspace(0.1, 0.9, 9)  # places on a bone that are looked at
+_FOOT = 0.15  # part of a leg's path from its tip that is left out: toes may have no bones
 _LONG = 0.04  # shortest bone that counts, as a fraction of the template's size
 
 
@@ -106,9 +109,11 @@ def judge(
     target: Mesh,
     alignment: Alignment,
     solids: tuple[Solid, Solid] | None = None,
+    legs: tuple[LimbPair, ...] = (),
 ) -> tuple[Finding, ...]:
     """Return what speaks for and against a rig of a target, made from that of a posed template.
 
+    ``legs``: those of the target, if they were found.
     ``figure`` in ``figure_pose`` is the rigged target. Nothing is judged if the user has placed the
     template, or if a part of a figure, such as clothes, is where the template has it.
     """
@@ -129,6 +134,7 @@ def judge(
         Body(target.positions, target.triangles, figure.require_skin(), rigged, solids[1]),
         skeleton.parents,
         alignment,
+        legs,
     )
 
 
@@ -139,7 +145,11 @@ def refusal(found: tuple[Finding, ...]) -> str:
 
 
 def findings(
-    template: Body, target: Body, parents: Ints, alignment: Alignment
+    template: Body,
+    target: Body,
+    parents: Ints,
+    alignment: Alignment,
+    legs: tuple[LimbPair, ...] = (),
 ) -> tuple[Finding, ...]:
     """Return what speaks for and against a rig of a target, made from that of a template."""
     joints = template.joints
@@ -165,6 +175,7 @@ def findings(
             good=0.06,
         ),
         *_bones_inside(template, target, bones, scale),
+        *_bones_in_legs(target, parents, legs),
         Finding(
             "R017.thickness: the mesh is only {value:.2g} times as thick as the template",
             _thickness(target) / max(_thickness(template), 1e-12),
@@ -210,6 +221,38 @@ def _bones_inside(template: Body, target: Body, bones: Ints, scale: float) -> tu
             float(np.median(other[inside] / (scale * own[inside]))),
             wrong=0.1,
             good=0.4,
+        ),
+    )
+
+
+def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> tuple[Finding, ...]:
+    """Return a finding about the pair of legs whose bones follow it least, none without legs."""
+    ends = np.flatnonzero(parents >= 0)
+    starts, ways = target.joints[parents[ends]], target.joints[ends] - target.joints[parents[ends]]
+    squares = np.maximum(np.einsum("ba,ba->b", ways, ways), 1e-300)
+    followed = []
+    for pair in legs:
+        parts = []
+        for leg in pair.limbs:
+            arc = arc_lengths(leg.points)
+            rows = arc >= _FOOT * arc[-1]
+            # The closest point of each bone: its start plus t of its way, 0 <= t <= 1.
+            apart = leg.points[rows, None] - starts
+            along = np.clip(np.einsum("nba,ba->nb", apart, ways) / squares, 0.0, 1.0)
+            gaps = np.linalg.norm(apart - along[..., None] * ways, axis=2).min(axis=1)
+            # Radii are known to a voxel.
+            radii = np.maximum(leg.radii[rows], target.solid.spacing)
+            parts.append(float((gaps <= radii).mean()))
+        followed.append(float(np.mean(parts)))
+    if not followed:
+        return ()
+    # The middle of these: more of a leg is away from the bones than along them.
+    return (
+        Finding(
+            "R017.legs: bones follow only {value:.0%} of the legs",
+            min(followed),
+            wrong=0.25,
+            good=0.75,
         ),
     )
 

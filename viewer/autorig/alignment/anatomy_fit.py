@@ -25,6 +25,7 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.anatomy import (
     Anatomy,
     BodyPoints,
+    LimbPair,
     Plan,
     anatomy_of,
     body_points,
@@ -81,6 +82,8 @@ class Start:
     fitted: Fitted
     marks: Marks
     plan: Plan
+    legs: tuple[LimbPair, ...]
+    """The target's pairs of limbs that stand on the ground."""
     is_sure: bool
     """Whether the facing is known: given, or shown by the feet."""
     is_usual: bool
@@ -174,7 +177,9 @@ def _start(
     whole = resized(marked, limbs_of(marked), *np.exp(fitted.grown))
     ahead = np.cross(plan.left, target.up)
     is_usual = bool(ahead @ _USUAL_FRONT > 0.5)
-    return Start(marked, replace(fitted, figure=whole), marks, plan, is_sure, is_usual, error)
+    legs = (plan.lower, plan.upper) if body.is_quadruped else (plan.lower,)
+    fitted = replace(fitted, figure=whole)
+    return Start(marked, fitted, marks, plan, legs, is_sure, is_usual, error)
 
 
 def _only(figure: Figure, limbs: Limbs, vertices: Ints) -> tuple[Figure, Limbs]:

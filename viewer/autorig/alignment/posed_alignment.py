@@ -40,7 +40,7 @@ from viewer.autorig.alignment.surface_alignment import (
     misfit,
     nearly_similar,
 )
-from viewer.autorig.anatomy import anatomy_of
+from viewer.autorig.anatomy import LimbPair, anatomy_of
 from viewer.autorig.solid import Solid
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
@@ -96,6 +96,8 @@ class PosedAlignment:
     """Messages about changes to pose and proportions, and about better options."""
     most_rotated: tuple[float, str] = (0.0, "")
     """The largest joint rotation in radians, and the joint's name; (0, "") if none."""
+    legs: tuple[LimbPair, ...] = ()
+    """The target's legs from which it was fitted."""
     solids: tuple[Solid, Solid] | None = None
     """The solids of the template in the given pose and of the target, if they were looked at."""
 
@@ -291,7 +293,7 @@ def _facing(job: _Job, ours: Posed, rigid: Alignment, by_limbs: list[_LimbFit]) 
 def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:
     """Fit a template to the surface whose limbs are already where the target's are."""
     found = _fitted_marks(job, start.marked, start.fitted, start.marks)
-    return replace(found, alignment=replace(found.alignment, has_limbs=True))
+    return replace(found, alignment=replace(found.alignment, has_limbs=True), legs=start.legs)
 
 
 def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> PosedAlignment:
