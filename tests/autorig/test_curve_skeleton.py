@@ -95,7 +95,7 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
     )
     row = np.zeros(1, dtype=np.int32)
     tree = Tree(
-        np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3, np.zeros((0, 3))
+        np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3, np.zeros((0, 3)), row
     )
     plane = _Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
     assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
@@ -230,7 +230,8 @@ def test_loop_is_cut_where_a_limb_only_touches_the_trunk():
     assert min(np.linalg.norm(joints[name] - [0.9, 1.9, 0.0]) for name in above) < 0.2
 
 
-def test_small_holes_are_no_loops():
+def test_small_holes_are_no_loops(monkeypatch):
+    half_resolution(monkeypatch)
     # A plate with a hole whose rim is wider than the hole.
     plates = [
         box((-1.5, -0.2, -1), (1.5, 0.2, -0.2)), box((-1.5, -0.2, 0.2), (1.5, 0.2, 1)),
@@ -246,6 +247,54 @@ def test_sheets_and_several_objects_are_refused():
     one = beast()
     with pytest.raises(RigError, match="expected one object, found parts far from the largest"):
         found(united(one, (one[0] + [6.0, 0, 0], one[1])))
+
+
+def test_objects_that_only_touch_are_refused_with_the_place(monkeypatch):
+    half_resolution(monkeypatch)
+    pointed = pipe([(-2, 0, 0), (0, 0, 0)], 0.3, around=16)
+    other = pipe([(0.6, -1, 0), (0.6, 1, 0)], 0.3, around=16)
+    with pytest.raises(RigError, match=r"ones that only touch, the largest at 0\.[23]") as caught:
+        found(united(pointed, other))
+    assert str(caught.value).endswith("rig each object alone")
+    # The same parts, one in the other, are one object.
+    lines = found(united(pointed, (other[0] - [0.5, 0, 0], other[1]))).lines
+    assert "2 separate parts are rigged as one object" in [str(line) for line in lines]
+
+
+HINGES = [1.4, 2.3]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """Return an arm of rods on a base with balls between them, and the part of each vertex."""
+    ends = ((0.45, 1.3, 0.12), (1.5, 2.2, 0.1), (2.4, 2.9, 0.08))
+    rods = [pipe([(0, low, 0), (0, high, 0)], radius, around=16) for low, high, radius in ends]
+    balls = [pipe([(0, y, -0.1), (0, y, 0.1)], 0.16, around=16) for y in HINGES]
+    parts = [pipe([(0, 0.1, 0), (0, 0.3, 0)], 0.35, around=16), *rods, *balls]
+    return united(*parts), np.repeat(np.arange(6), [len(part[0]) for part in parts])
+
+
+def test_straight_arm_of_parts_has_joints_where_they_meet(robot):
+    joints = joints_of(found(robot[0]).figure.skeleton)
+    assert len(joints) == 5
+    heights = np.sort([place[1] for place in joints.values()])
+    # Base, its top, and both hinges to within half of their size.
+    assert_allclose(heights[2:4], HINGES, atol=0.16)
+    assert_allclose([place[::2] for place in joints.values()], 0.0, atol=0.05)
+
+
+def test_rods_of_an_arm_move_rigidly(robot, tmp_path):
+    (positions, triangles), owners = robot
+    target, output = tmp_path / "robot.obj", tmp_path / "robot.glb"
+    export(Actor(Figure("robot", mesh_of(positions, triangles))), target)
+    assert run(["rig", str(target), "--auto", "-o", str(output)]) == 0
+    skin = viewer.load(output).actors[0].figure.skin
+    weights = np.zeros((len(positions), skin.n_joints))
+    rows = np.repeat(np.arange(len(positions)), np.diff(skin.starts))
+    np.add.at(weights, (rows, skin.joints), skin.weights)
+    rods = [weights[owners == part] for part in (1, 2, 3)]
+    assert all((each.max(axis=1) > 0.99).mean() > 0.95 for each in rods)
+    assert len({int(each.sum(axis=0).argmax()) for each in rods}) == 3
 
 
 def test_a_few_stray_vertices_are_reported():

@@ -11,9 +11,10 @@ branches.
   farthest from the trunk.
 - Branches closer to each other than the solid's radius there are one joint: a *hub*.
 - A limb begins where its level set parts from those of the others: at the surface of the trunk.
-- Joints are where the path bends (Douglas and Peucker 1973) if it bends sharply a few times, as a
-  leg does. A straight or smoothly curved limb gets joints at even distances, whose number grows
-  with its length relative to its width: tails, tentacles, snakes, fingers.
+- Joints are where separate parts of a limb meet, as those of a robot's arm. Otherwise, they are
+  where the path bends (Douglas and Peucker 1973) if it bends sharply a few times, as a leg does. A
+  straight or smoothly curved limb gets joints at even distances, whose number grows with its length
+  relative to its width: tails, tentacles, snakes, fingers.
 - Limbs on both sides of a plane of symmetry are paired. Both get the same number of joints, and
   mirrored positions if they are in mirrored poses.
 """
@@ -33,6 +34,7 @@ from viewer.autorig.alignment.orientation_search import (
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.anatomy import Limb, arc_lengths, paired, sagittal_plane
 from viewer.autorig.medial import LevelSets, Paths, Protrusion
+from viewer.autorig.parts import Parts, parts_of
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import Solid, solid_within
 from viewer.data_classes import dataclass
@@ -46,6 +48,9 @@ from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import ball_skeleton
 
 _FINEST = 160  # voxels along the longest side of thin meshes: legs of spiders
+# Fractions of the solid in an object that only touches the largest one: of one that is refused,
+# and of one that is reported. Smaller ones are ornaments.
+_OBJECT, _PART = 0.2, 0.05
 _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of the vertices there
 # Distance from the skeleton, relative to its half width and to the largest radius of the solid, and
 # fraction of the solid there for which sheets are reported.
@@ -78,6 +83,9 @@ _AROUND, _MOST = 1.0, 0.6
 # Exponent in the number of bones of a smooth limb, (length / half width)^k. It gives a finger (8) 3
 # bones, a tentacle (30) 8, a snake (50) 10; joints as dense as in a finger would give a snake 20.
 _DENSITY = 0.6
+# Parts of a chain, relative to the half width: up to the first length, a part between two others is
+# a hinge; beyond the second, it is not rigid and has joints of its own.
+_HINGE, _RIGID = 3.0, 10.0
 # Least distance of bends, relative to the half width and to the length: a rounded knee is one bend.
 _CLOSEST, _CLOSEST_PART = 3.0, 0.1
 _END = 0.5  # distance of the last joint from the tip, relative to the half width
@@ -110,6 +118,8 @@ class Chain:
     """Length of the part of the path inside the hub where it begins; 0 for none."""
     tips: frozenset[int]
     """All tips beyond its start."""
+    seams: tuple[float, ...] = ()
+    """Lengths along the path at which one separate part of the mesh ends and another begins."""
 
     @property
     def length(self) -> float:
@@ -133,6 +143,8 @@ class Tree:
     """Voxels of the path from the place to each tip."""
     cuts: Floats
     """(C, 3). Places where loops were cut."""
+    levels: Ints
+    """(N,). Level set of each voxel."""
 
 
 def at_lengths(points: Floats, lengths: Floats) -> Floats:
@@ -188,6 +200,11 @@ class _Field:
         there = route[int(np.abs(self.distances[route] - half).argmin())]
         return bool(self.tips.stood_out[tip] or self.widths(there) < half)
 
+    @property
+    def levels(self) -> Ints:
+        """Level set of each voxel: (N,)."""
+        return self._levels.labels
+
     def widths(self, rows: Ints) -> Floats:
         """Return the half widths of the level sets of voxels."""
         found: Floats = self._widths[self._levels.labels[rows]]
@@ -237,7 +254,7 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
     routes = tuple(field.routes.values())
-    return Tree(places, paths.radii[rows], rows, ordered, routes, field.cuts)
+    return Tree(places, paths.radii[rows], rows, ordered, routes, field.cuts, field.levels)
 
 
 def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner: bool) -> int:
@@ -382,12 +399,35 @@ def _inside_end(solid: Solid, paths: Paths, route: Ints) -> int:
 
 
 def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, bool]:
-    """Return the lengths (N,) along a chain of its joints, the end included; and if it bends."""
+    """Return the lengths (N,) along a chain of its joints, the end included.
+
+    Also returns whether they are where it bends or where its parts meet.
+    """
     width = chain.half_width
     stop = chain.length - (_END * width if chain.end < 0 else 0.0)
     start = min(chain.begin, stop)
     first = [start] if start > 0.0 and stop - start >= width else []
-    length = stop - start
+    near = _HINGE * width
+    seams = [length for length in chain.seams if start - near <= length <= stop - width]
+    if seams and seams[0] <= start + near:
+        start = max(start, seams.pop(0))
+        first = [start]
+    if not seams:
+        inner, jointed = _inner_joints(chain, start, stop, spacing, factor)
+        return np.array([*first, *inner, stop]), jointed
+    found = first
+    for begin, end in pairwise([start, *seams, stop]):
+        if end - begin > _RIGID * width:
+            found = [*found, *_inner_joints(chain, begin, end, spacing, factor)[0]]
+        found = [*found, end]
+    return np.array(found), True
+
+
+def _inner_joints(
+    chain: Chain, start: float, stop: float, spacing: float, factor: float
+) -> tuple[Floats, bool]:
+    """Return the lengths of joints between two of a chain (N,), and whether it bends there."""
+    width, length = chain.half_width, stop - start
     path = at_lengths(chain.points, np.linspace(start, stop, max(2, int(length / spacing) + 1)))
     closest = max(_CLOSEST * width, _CLOSEST_PART * length)
     bends = _bends(path, max(_TOLERANCE * width, _ROUGH * spacing), closest)
@@ -399,7 +439,28 @@ def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, 
         count = (length / width) ** _DENSITY / factor
         bones = max(1, int(count) if chain.end >= 0 else round(count))
         inner = start + length * np.arange(1, bones) / bones
-    return np.array([*first, *inner, stop]), jointed
+    return inner, jointed
+
+
+def _seams(lengths: Floats, owners: Ints, hinge: float) -> tuple[float, ...]:
+    """Return where the parts of a path (K,) meet, and the middles of parts up to ``hinge`` long."""
+    firsts = np.flatnonzero(np.diff(owners, prepend=-1))
+    starts = [float(lengths[first]) for first in firsts]
+    labels = owners[firsts].tolist()
+    while len(labels) > 1:
+        sizes = np.diff([*starts, float(lengths[-1])])
+        short = int(sizes.argmin())
+        if sizes[short] > hinge:
+            break
+        if 0 < short < len(labels) - 1:
+            middle = starts[short] + 0.5 * float(sizes[short])
+            del labels[short], starts[short]
+            starts[short] = middle
+            if labels[short - 1] == labels[short]:  # a ring or a bump
+                del labels[short], starts[short]
+        else:
+            del labels[short], starts[max(short, 1)]
+    return tuple(starts[1:])
 
 
 def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
@@ -469,6 +530,18 @@ def _angles(corners: Floats) -> Floats:
     ways = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
     angles: Floats = np.arccos(np.clip((ways[:-1] * ways[1:]).sum(axis=1), -1.0, 1.0))
     return angles
+
+
+def _parted(chain: Chain, solid: Solid, owners: Ints) -> Chain:
+    """Return a chain with the places where separate parts of the mesh meet.
+
+    ``owners``: the part around each voxel, -1 where there is none.
+    """
+    path = at_lengths(chain.points, np.arange(0.0, chain.length, 0.5 * solid.spacing))
+    around, lengths = owners[solid.nearest(path)], arc_lengths(path)
+    known = around >= 0
+    seams = _seams(lengths[known], around[known], _HINGE * chain.half_width)
+    return replace(chain, seams=seams)
 
 
 # Symmetry and names.
@@ -574,12 +647,22 @@ def find_skeleton(
     with part_of_work(span=(0.0, 0.4)):
         solid = solid_within(target.positions, target.triangles, _FINEST)
     n_stray = _check_one(target, solid)
+    parts = parts_of(target, solid)
+    shares = np.sort(parts.shares)[::-1]
+    touching = 0.0 if parts.contact is None else float(shares[1])
+    where = "" if parts.contact is None else listed([rounded(x) for x in parts.contact.tolist()])
+    if touching >= _OBJECT:
+        raise RigError(
+            f"expected one object, found separate ones that only touch, the largest at {where}; "
+            "rig each object alone"
+        )
     with part_of_work(span=(0.4, 1.0)):
         found = joints_in(
             solid,
             axis_direction(named),
             axis_direction(front),
             how,
+            parts,
             is_facing_known=alignment.facing is not None,
         )
     names, parents, places = found.names, found.parents, found.positions
@@ -590,6 +673,17 @@ def find_skeleton(
         unit=source.unit,
     )
     lines = [*_lines(found, front, alignment.facing is None)]
+    if parts.count > 1:
+        n = counted(parts.count, "separate part", "is", "are")
+        lines.append(note("R015.parts: {n} rigged as one object", n=n))
+    if touching >= _PART:
+        lines.append(
+            note(
+                "R016.touching: a part only touches the others at {place}: a separate object "
+                "should be rigged alone",
+                place=where,
+            )
+        )
     if n_stray:
         n = counted(n_stray, "vertex", "is", "are")
         lines.append(note("R016.stray: {n} far from the largest part, which has all joints", n=n))
@@ -660,7 +754,12 @@ class Joints:
 
 
 def joints_in(
-    solid: Solid, up: Floats, front: Floats, how: SkeletonSettings, is_facing_known: bool
+    solid: Solid,
+    up: Floats,
+    front: Floats,
+    how: SkeletonSettings,
+    parts: Parts,
+    is_facing_known: bool,
 ) -> Joints:
     """Return the joints of a solid; ``up``, ``front``: (3,), its directions."""
     report_fraction(0.0, "looking for limbs")
@@ -669,6 +768,9 @@ def joints_in(
     if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
         raise RigError("expected a solid with limbs, found a sheet without thickness")
     report_fraction(0.8, "placing joints")
+    if parts.count > 1:
+        owners = parts.around(tree.levels)[tree.levels]
+        tree = replace(tree, chains=tuple(_parted(chain, solid, owners) for chain in tree.chains))
     plane, partner = _symmetry_of(solid, tree, up, front, how.symmetry)
     points = _joint_points(tree, plane, partner, solid.spacing, how.joint_spacing)
     heights = solid.centers(solid.voxels) @ up
