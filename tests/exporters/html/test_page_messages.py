@@ -217,3 +217,9 @@ def test_widget_reads_back_what_the_page_has_chosen():
     assert rotations.shape == (24,) and np.isfinite(rotations).all()
     data, _ = widget._repr_mimebundle_()
     assert data["image/png"].startswith(b"\x89PNG")
+
+
+def test_saved_outputs_of_a_widget_fall_back_to_a_picture():
+    """A saved notebook has both: GitHub and VS Code without widgets show the picture."""
+    data, _ = viewer.widget(posed())._repr_mimebundle_()
+    assert {"application/vnd.jupyter.widget-view+json", "image/png"} <= {*data}

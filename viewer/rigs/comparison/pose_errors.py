@@ -3,8 +3,12 @@
 Ionescu, Papava, Olaru, Sminchisescu 2014, "Human3.6M": MPJPE, after moving the roots together.
 Zhou, Zhu, Leonardos, Derpanis, Daniilidis 2017, "Sparseness Meets Deepness": PA-MPJPE, after the
 similarity that fits best. Kanazawa, Zhang, Felsen, Malik 2019, "Learning 3D Human Dynamics from
-Video": acceleration error. Pavlakos, Zhu, Zhou, Daniilidis 2018: per-vertex error. Shin, Kim,
-Halilaj, Black 2024, "WHAM": foot skate, in frames in which the feet of the reference stand.
+Video": acceleration error. Pavlakos, Zhu, Zhou, Daniilidis 2018: per-vertex error.
+
+Foot skate follows Shin, Kim, Halilaj, Black 2024, "WHAM". Their ``compute_foot_sliding`` averages
+the steps of four vertices of the soles over the frames in which those of the reference move less
+than 1 cm. Here, a foot stands while ``foot_contacts`` says so of the reference, and its ball or
+ankle counts, so that figures without a mesh or with other vertices have a value, too.
 """
 
 from __future__ import annotations
