@@ -17,7 +17,7 @@ from viewer.rigs.geometry.rotation import (
     quaternion_to_matrix,
 )
 from viewer.rigs.geometry.transform import apply_transform
-from viewer.rigs.geometry.vectors import axis_vector, unit
+from viewer.rigs.geometry.vectors import axes_along, axis_vector, unit
 from viewer.rigs.humanoid import Humanoid
 from viewer.rigs.kinematics import joint_worlds, world_matrices
 from viewer.rigs.pose import Pose, joint_rotations, local_matrices, rest_pose
@@ -119,7 +119,7 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     left = unit(np.asarray(across) - up * float(np.dot(across, up)))
     if not left.any():
         left = np.array([1.0, 0.0, 0.0])
-    return np.stack([left, up, np.cross(left, up)])
+    return axes_along(up, left).T
 
 
 def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:

@@ -34,6 +34,13 @@ def axis_vector(name: str) -> Floats:
     return np.eye(3)["xyz".index(name)]
 
 
+def axes_along(main: Floats, side: Floats) -> Floats:
+    """Return axes as columns (3, 3): near ``side``, along ``main``, and across."""
+    # Gram-Schmidt orthogonalisation that keeps the main axis and adjusts the side.
+    second, third = unit(main), unit(np.cross(side, main))
+    return np.stack([np.cross(second, third), second, third], axis=1)
+
+
 def reflected(points: Floats, axis: int, centre: float = 0.0) -> Floats:
     """Return the mirror images of points (..., 3) across the plane at ``centre`` on an axis."""
     images = points.copy()

@@ -23,7 +23,7 @@ from viewer.rigs.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rigs.geometry.vectors import Up, axis_vector, unit
+from viewer.rigs.geometry.vectors import Up, axes_along, axis_vector, unit
 from viewer.rigs.hierarchy import path_to_root, with_ancestors
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.joint_names import joint_meanings
@@ -251,7 +251,7 @@ def _trunk(
     place = {joint: _place(skeleton, found, joint) for joint in (top, *hips)}
     height = unit(place[top] - (place[hips[0]] + place[hips[1]]) / 2.0)
     side = place[hips[0]] - place[hips[1]]
-    tilt = stands @ _axes_along(height, side).T
+    tilt = stands @ axes_along(height, side).T
     return {joint: tilt @ rotation for joint, rotation in found.items()}
 
 
@@ -269,13 +269,13 @@ def _limb(limb: LimbAxes, stands: Floats, joints: dict[str, int]) -> dict[int, F
     # side, and its elbow bends forwards, about cross(side, forward), the vertical axis.
     left, up, forward = stands.T
     if limb.upper.endswith("hip"):
-        wanted = _axes_along(-up, left)
+        wanted = axes_along(-up, left)
     else:
         side = left if limb.upper.startswith("left") else -left
-        wanted = _axes_along(side, np.cross(side, forward))
+        wanted = axes_along(side, np.cross(side, forward))
     # R B = W: bone and bending axis, B in the axes of the joint, point in the wanted directions W.
     return {
-        joints[name]: wanted @ _axes_along(bone, bend).T
+        joints[name]: wanted @ axes_along(bone, bend).T
         for name, bone, bend in zip((limb.upper, limb.lower), limb.bones, limb.bends, strict=True)
     }
 
@@ -294,7 +294,7 @@ def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
     front = np.einsum("fba,fb->a", axes, ahead)
     sole = np.einsum("fba,b->a", axes, low.up)
     left, up, _ = stands.T
-    return {ankle: _axes_along(up, left) @ _axes_along(sole, np.cross(sole, front)).T}
+    return {ankle: axes_along(up, left) @ axes_along(sole, np.cross(sole, front)).T}
 
 
 def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Floats]:
@@ -310,7 +310,7 @@ def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Float
     left, up, forward = stands.T
     wanted = np.cos(_SLOPE) * forward - np.sin(_SLOPE) * up
     across = np.einsum("fba,fb->a", axes, bends)
-    return {ankle: _axes_along(wanted, left) @ _axes_along(front, across).T}
+    return {ankle: axes_along(wanted, left) @ axes_along(front, across).T}
 
 
 def _hands(skeleton: Skeleton, joints: dict[str, int]) -> dict[int, tuple[Floats, Floats]]:
@@ -335,12 +335,6 @@ def _straight(mean: Floats, forearm: Floats, hand: Floats) -> Floats:
     """Return the mean rotation of a hand without its bend, unless the bend is too large."""
     bent = mean @ hand
     return shortest_arc(bent, forearm) @ mean if bent @ forearm > _BENT else mean
-
-
-def _axes_along(main: Floats, side: Floats) -> Floats:
-    """Return axes as columns: near ``side``, along ``main``, and across."""
-    second, third = unit(main), unit(np.cross(side, main))
-    return np.stack([np.cross(second, third), second, third], axis=1)
 
 
 # Rest pose of skeletons whose joint axes are parallel to the body's in a T-pose.

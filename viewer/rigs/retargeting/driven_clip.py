@@ -11,7 +11,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply
 from viewer.rigs.geometry.rotation import quaternion_to_matrix, up_rotation
-from viewer.rigs.geometry.vectors import Up, axis_vector
+from viewer.rigs.geometry.vectors import Up, axes_along, axis_vector
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_feet import feet_notes, plant_feet
@@ -86,12 +86,9 @@ def front_axes(points: Floats, matches: Matches, up: Up, is_source: bool) -> Flo
         if min(pair) < 0:
             continue
         left = points[pair[0]] - points[pair[1]]
-        left = left - (left @ upward) * upward
-        if np.linalg.norm(left) > short:
-            left = left / np.linalg.norm(left)
-            return np.stack([left, upward, np.cross(left, upward)])
-    left = np.eye(3)[0]
-    return np.stack([left, upward, np.cross(left, upward)])
+        if np.linalg.norm(left - (left @ upward) * upward) > short:
+            return axes_along(upward, left).T
+    return axes_along(upward, np.eye(3)[0]).T
 
 
 def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip:

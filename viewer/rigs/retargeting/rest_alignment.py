@@ -11,7 +11,7 @@ from viewer.rigs.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.geometry.vectors import axes_along, axis_vector
 from viewer.rigs.kinematics import joint_worlds, world_matrices
 from viewer.rigs.pose import zero_pose
 from viewer.rigs.retargeting.joint_matches import Matches
@@ -254,15 +254,10 @@ def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
 
 
 def _frame(side: Floats, main: Floats) -> Floats | None:
-    """Return axes as columns: near ``side``, along ``main``, and across; None if parallel."""
-    across = np.cross(side, main)
-    length = np.linalg.norm(across)
+    """Return ``axes_along``; None if the vectors are parallel."""
     # |side x main| = |side| |main| sin(angle between them).
-    if not length > _PARALLEL * np.linalg.norm(side) * np.linalg.norm(main):
-        return None
-    # Gram-Schmidt orthogonalisation that keeps the main axis and adjusts the side.
-    third, second = across / length, main / np.linalg.norm(main)
-    return np.stack([np.cross(second, third), second, third], axis=1)
+    least = _PARALLEL * np.linalg.norm(side) * np.linalg.norm(main)
+    return axes_along(main, side) if np.linalg.norm(np.cross(side, main)) > least else None
 
 
 def shortest_arc(start: Floats, end: Floats) -> Floats:
