@@ -10,10 +10,12 @@ from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment import pose_fit, posed_alignment
 from viewer.autorig.alignment.anatomy_fit import FADED, start_of_landmarks
+from viewer.autorig.alignment.icp import Cloud, Triangles
 from viewer.autorig.alignment.pose_fit import Fitted
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.surface.samples import sample_surface
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
 from viewer.rigs.pose import rest_pose
@@ -125,7 +127,9 @@ def test_long_arms_and_wide_hips_that_were_found_are_kept(monkeypatch):
     pose = rest_pose(figure.skeleton)
     posed = deform(figure, pose)[0]
     target, triangles = posed * factors, figure.mesh.triangles
-    job = posed_alignment._job(figure, pose, target, triangles, AlignmentSettings(samples=60))
+    exact = Triangles(target, triangles, 60)
+    cloud = Cloud(exact.samples, sample_surface(target, triangles, 360))
+    job = posed_alignment._Job(figure, pose, cloud, exact, True, AlignmentSettings(samples=60))
     joints = joint_matrices(figure, pose)[:, :3, 3]
     known = np.stack([joints, joints * factors], axis=1)
     still = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
