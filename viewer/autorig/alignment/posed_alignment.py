@@ -306,15 +306,30 @@ def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> Pos
         return found
     # The surface of a similar figure is a better guide to its joints than the anatomy. What the
     # surface does not show, such as the joints of the spine, bends as in the template. Of lengths
-    # and girths, template and anatomy are two estimates with errors of similar size: the mean of
-    # their logarithms is kept. From the template's alone, wide bodies would become narrower again.
+    # and girths, template and anatomy are two estimates: the template's alone would make a wide
+    # body narrower again, the anatomy of a thick coat is inaccurate. The surface decides between
+    # the template's and the mean of the logarithms of both.
     since = start_of(marked, job.pose, state.similarity)
-    since = replace(since, grown=0.5 * state.grown)
     kept = marks.chosen(is_landmark)
     if kept is None:
         marked, state = job.template, _of_template(job, state)
-    state = fit_pose(marked, state, job.exact, job.exact, True, kept, _CLOSER, since)
-    return _unmarked(job, state)
+    fits = [
+        _unmarked(
+            job,
+            fit_pose(
+                marked,
+                state,
+                job.exact,
+                job.exact,
+                True,
+                kept,
+                _CLOSER,
+                replace(since, grown=part * state.grown),
+            ),
+        )
+        for part in (0.0, 0.5)
+    ]
+    return min(fits, key=lambda fit: misfit(fit.alignment, False))
 
 
 def _unmarked(job: _Job, state: Fitted) -> PosedAlignment:
