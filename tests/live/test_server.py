@@ -16,6 +16,7 @@ from live.test_messages import framed
 from live_screen import can_undo, screen_at
 
 import viewer
+from viewer.app.live import _ACTIONS
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path
 from viewer.live.messages import Message, packed, read, receiver
@@ -261,6 +262,15 @@ def pose_of(**changes):
         (Message("remove", {}), "actor: expected an integer"),
         (Message("remove", {"actor": 9}), "no actor 9"),
         (Message("time", {"time": "now"}), "expected a number"),
+        (Message("time", {"time": 10**400}), "expected a finite number"),
+        (
+            Message(
+                "look",
+                {"actor": 1, "opacity": 1, "visible": True, "color": [10**400, 0, 0]},
+                [np.eye(4)],
+            ),
+            "color: expected a finite number",
+        ),
         (Message("scene", {"up": "x"}), "up axis"),
         (Message("put", {}), "expected an actor"),
         (Message("put", {"object": {"kind": "Pose", "fields": {}}}), "Pose"),
@@ -276,6 +286,16 @@ def test_bad_message_is_answered_counted_and_survived(screen, message, why):
     assert (ok.do, bad.do, after.do) == ("ok", "error", "ok")
     assert re.search(why, bad.facts["text"]), bad.facts["text"]
     assert after.facts["counts"]["refused"] == 1
+
+
+def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, monkeypatch):
+    def fail(*_):
+        raise ZeroDivisionError("of nothing")
+
+    monkeypatch.setitem(_ACTIONS, "time", fail)
+    with pytest.raises(ViewerError, match="ZeroDivisionError: of nothing"):
+        live.time = 1.0
+    assert live.selection == ("first",)
 
 
 def test_random_bytes_leave_the_server_at_work(screen):

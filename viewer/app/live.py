@@ -13,8 +13,7 @@ from viewer.app.closing import Closing
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
-from viewer.live.messages import Message, MessageError
+from viewer.live.messages import Message, MessageError, told_of
 from viewer.live.objects import unpack
 from viewer.live.server import Request, Server
 from viewer.live.vmc import Receiver, Sender, TPose, is_humanoid, perform, performed, t_pose
@@ -89,8 +88,8 @@ def advance_live(state: AppState) -> None:
     for request in server.take():
         try:
             answer = _ACTIONS[request.message.do](state, server, request)
-        except ViewerError as problem:
-            request.refuse(str(problem))
+        except Exception as problem:  # a mistake of the program, which must not end the window
+            request.refuse(told_of(problem))
         else:
             server.follow(state.scene.actors)
             request.answer(*answer)
@@ -194,8 +193,8 @@ def answer_first_scene(server: Server, request: Request) -> FirstScene | None:
         camera, options = found["camera"], found["options"]
         if not isinstance(camera, Camera | None) or not isinstance(options, DisplayOptions | None):
             raise MessageError("scene: expected a camera and display options")
-    except ViewerError as problem:
-        request.refuse(str(problem))
+    except Exception as problem:  # as in ``advance_live``
+        request.refuse(told_of(problem))
         return None
     request.answer(_numbers_of(server, scene))
     return FirstScene(scene, camera, options)
@@ -270,13 +269,11 @@ def _actor(server: Server, message: Message) -> Actor:
 def _set_look(state: AppState, server: Server, request: Request) -> _Answer:
     """Set visibility, colour, opacity and placement."""
     message = request.message
-    actor, color = _actor(server, message), message.facts.get("color")
+    actor, color = _actor(server, message), None
     placement = message.array(0, (4, 4))
-    if color is not None:
-        is_color = isinstance(color, list) and len(color) == 3
-        if not is_color or not all(isinstance(each, int | float) for each in color):
-            raise MessageError("color: expected three numbers or null")
-        color = tuple(min(max(float(each), 0.0), 1.0) for each in color)
+    if message.facts.get("color") is not None:
+        red, green, blue = (min(max(each, 0.0), 1.0) for each in message.numbers("color", 3))
+        color = red, green, blue
     actor.opacity = min(max(message.number("opacity"), 0.0), 1.0)
     actor.visible, actor.color = message.facts.get("visible") is True, color
     actor.placement = placement
@@ -303,11 +300,7 @@ def _set_camera(state: AppState, server: Server, request: Request) -> _Answer:
             raise MessageError(f"{name}: expected {low:g} to {high:g}, found {value:g}")
         setattr(camera, name, value)
     if "target" in message.facts:
-        target = message.facts["target"]
-        if not isinstance(target, list) or len(target) != 3:
-            raise MessageError("target: expected three numbers")
-        numbers = [Message("camera", {"target": each}).number("target") for each in target]
-        camera.target = np.array(numbers)
+        camera.target = np.array(message.numbers("target", 3))
     camera.fixed = None
     state.camera, state.framing.is_fitting = camera, False
     state.limit_camera()

@@ -71,12 +71,14 @@ class Message:
 
     def number(self, name: str) -> float:
         """Return a finite number among the facts."""
+        return _finite(name, self.facts.get(name))
+
+    def numbers(self, name: str, count: int) -> list[float]:
+        """Return a list of finite numbers among the facts."""
         value = self.facts.get(name)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise MessageError(f"{name}: expected a number, found {_shown(value)}")
-        if not math.isfinite(value):
-            raise MessageError(f"{name}: expected a finite number, found {value}")
-        return float(value)
+        if not isinstance(value, list) or len(value) != count:
+            raise MessageError(f"{name}: expected {count} numbers, found {_shown(value)}")
+        return [_finite(name, each) for each in value]
 
     def index(self, name: str) -> int:
         """Return an integer among the facts."""
@@ -109,6 +111,18 @@ class Message:
         if not np.isfinite(values).all():
             raise MessageError(f"{self.do}: array {index}: expected finite numbers")
         return values
+
+
+def _finite(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise MessageError(f"{name}: expected a number, found {_shown(value)}")
+    try:
+        number = float(value)
+    except OverflowError:  # integers of JSON may be of any size
+        number = math.inf
+    if not math.isfinite(number):
+        raise MessageError(f"{name}: expected a finite number, found {_shown(value)}")
+    return number
 
 
 def packed(message: Message) -> bytes:
