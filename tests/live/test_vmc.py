@@ -331,3 +331,11 @@ def test_port_in_use_is_an_error_of_one_line():
     with pytest.raises(ViewerError, match=f"--vmc-in 127.0.0.1:{receiver.port}"):
         Receiver("127.0.0.1", receiver.port)
     receiver.close()
+
+
+@pytest.mark.parametrize("host", ["é..x", f"{'é' * 70}.example"])
+def test_impossible_host_is_an_error_of_one_line(host):
+    with pytest.raises(ViewerError, match=f"--vmc-in {host[:10]}"):
+        Receiver(host, 39539)
+    with pytest.raises(ViewerError, match=f"--vmc-out {host[:10]}"):
+        Sender(host, 39539)

@@ -98,6 +98,11 @@ class Counts:
     malformed: int = 0
 
 
+def _no_address(option: str, host: str, port: int, problem: Exception) -> str:
+    why = getattr(problem, "strerror", None) or problem
+    return f"{option} {printable(host, 60)}:{port}: {why}"
+
+
 class Receiver:
     """Receives packets in a thread, until ``close``; malformed ones are ignored and counted."""
 
@@ -109,9 +114,9 @@ class Receiver:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
-        except OSError as problem:
+        except (OSError, TypeError) as problem:  # TypeError: a name that cannot be encoded
             self._socket.close()
-            raise ViewerError(f"--vmc-in {host}:{port}: {problem.strerror or problem}") from None
+            raise ViewerError(_no_address("--vmc-in", host, port, problem)) from None
         self.port = int(self._socket.getsockname()[1])
         self._socket.settimeout(_AGAIN)  # so that the thread notices the end
         self._is_over = False
@@ -368,8 +373,8 @@ class Sender:
         self._started = time.monotonic()
         try:
             self._to = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4]
-        except OSError as problem:
-            raise OutputError(f"--vmc-out {host}:{port}: {problem.strerror or problem}") from None
+        except (OSError, UnicodeError) as problem:
+            raise OutputError(_no_address("--vmc-out", host, port, problem)) from None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._thread = threading.Thread(target=self._run, name="vmc out", daemon=True)
         self._thread.start()
