@@ -20,6 +20,7 @@ from viewer.app.live import _ACTIONS
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path
 from viewer.live.messages import Message, packed, read, receiver
+from viewer.live.objects import pack
 from viewer.live.server import Server
 from viewer.rigs.blendshapes import BlendShapes
 
@@ -286,6 +287,42 @@ def test_bad_message_is_answered_counted_and_survived(screen, message, why):
     assert (ok.do, bad.do, after.do) == ("ok", "error", "ok")
     assert re.search(why, bad.facts["text"]), bad.facts["text"]
     assert after.facts["counts"]["refused"] == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("visible", "yes"),
+        ("is_present", None),
+        ("person", "one"),
+        ("called", 5),
+        ("hidden_parts", frozenset(["tail"])),
+        ("shape_space", None),
+        ("offset", math.nan),
+        ("opacity", None),
+        ("color", "red"),
+        ("color", (1.0, 0.0)),
+        ("points", np.zeros(3)),
+        ("placement", np.eye(3)),
+    ],
+)
+def test_actor_that_cannot_be_drawn_is_refused(screen, live, name, value):
+    actor, arrays = viewer.Actor(bar()), []
+    setattr(actor, name, value)
+    told = {"object": pack(actor, arrays)}
+    with pytest.raises(ViewerError, match=name):
+        live._ask("put", told, arrays)
+    assert live.selection == ("first",)
+
+
+def test_look_may_be_numbers_of_numpy(screen, live):
+    color = np.array([1.0, 0.5, 0.0], np.float32)
+    actor = live.add(viewer.Actor(bar(), color=color, visible=np.bool_(False)))
+    shown = screen.state.scene.actors[-1]
+    assert (shown.visible, shown.color) == (False, (1.0, 0.5, 0.0))
+    color[2], actor.visible, actor.opacity = 0.25, np.bool_(True), np.float32(0.5)
+    live.update()
+    assert (shown.visible, shown.color, shown.opacity) == (True, (1.0, 0.5, 0.25), 0.5)
 
 
 def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, monkeypatch):

@@ -71,14 +71,14 @@ class Message:
 
     def number(self, name: str) -> float:
         """Return a finite number among the facts."""
-        return _finite(name, self.facts.get(name))
+        return finite(name, self.facts.get(name))
 
     def numbers(self, name: str, count: int) -> list[float]:
         """Return a list of finite numbers among the facts."""
         value = self.facts.get(name)
         if not isinstance(value, list) or len(value) != count:
             raise MessageError(f"{name}: expected {count} numbers, found {_shown(value)}")
-        return [_finite(name, each) for each in value]
+        return [finite(name, each) for each in value]
 
     def index(self, name: str) -> int:
         """Return an integer among the facts."""
@@ -113,7 +113,8 @@ class Message:
         return values
 
 
-def _finite(name: str, value: object) -> float:
+def finite(name: str, value: object) -> float:
+    """Return a finite number; ``MessageError`` for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MessageError(f"{name}: expected a number, found {_shown(value)}")
     try:

@@ -71,11 +71,12 @@ LEFT_OUT = {
 
 def pack(value: Any, arrays: list[Values]) -> Any:
     """Return a value as JSON, and append its arrays."""
+    if isinstance(value, np.number | np.bool_):
+        value = value.item()
     if value is None or isinstance(value, bool | str):
         return value
-    if isinstance(value, int | float | np.number):
-        plain = value.item() if isinstance(value, np.number) else value
-        return plain if math.isfinite(plain) else {"number": str(plain)}
+    if isinstance(value, int | float):
+        return value if math.isfinite(value) else {"number": str(value)}
     if isinstance(value, Deferred | np.ndarray):
         arrays.append(value.values() if isinstance(value, Deferred) else value)
         return {"array": len(arrays) - 1}

@@ -16,7 +16,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -50,6 +50,15 @@ _ANSWER_SECONDS = 90.0  # longer than a window may take
 _CLOSE_SECONDS = 5.0
 
 
+class _Look(NamedTuple):
+    """How an actor is drawn."""
+
+    visible: bool
+    color: tuple[float, ...] | None
+    opacity: float
+    placement: bytes
+
+
 @dataclass(slots=True)
 class _Sent:
     """What the window has of an actor."""
@@ -57,7 +66,7 @@ class _Sent:
     number: int
     """The window's number of the actor."""
     content: object
-    look: object
+    look: _Look
     pose: NumberKey
 
 
@@ -198,9 +207,9 @@ class Live:
         if look != sent.look:
             told = {
                 "actor": sent.number,
-                "visible": actor.visible,
-                "color": actor.color,
-                "opacity": actor.opacity,
+                "visible": look.visible,
+                "color": look.color,
+                "opacity": look.opacity,
             }
             self._ask("look", told, [np.asarray(actor.placement, np.float64)])
             sent.look = look
@@ -429,8 +438,11 @@ def _content(actor: Actor) -> object:
     return actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights
 
 
-def _look(actor: Actor) -> object:
-    return actor.visible, actor.color, actor.opacity, np.asarray(actor.placement).tobytes()
+def _look(actor: Actor) -> _Look:
+    # Programs may set arrays and numbers of NumPy.
+    color = None if actor.color is None else tuple(float(each) for each in actor.color)
+    placement = np.asarray(actor.placement).tobytes()
+    return _Look(bool(actor.visible), color, float(actor.opacity), placement)
 
 
 def _pose_key(actor: Actor) -> NumberKey:
