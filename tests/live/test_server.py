@@ -16,6 +16,7 @@ from live.test_messages import framed
 from live_screen import can_undo, screen_at
 
 import viewer
+from viewer.app.closing import Closing
 from viewer.app.live import _ACTIONS
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path
@@ -202,6 +203,14 @@ def test_programs_share_a_window_and_leave_what_they_sent(screen):
     two._socket.close()  # as when a program dies
     screen.wait(lambda: screen.server.counts.clients == 0)
     assert [each.name for each in screen.state.scene.actors] == ["first", "one"]
+
+
+def test_window_closes_when_the_program_that_owns_it_is_killed(screen):
+    raw(screen, hello(screen))
+    screen.wait(lambda: screen.server.counts.clients == 0)
+    assert not screen.state.of(Closing).is_over
+    raw(screen, hello(screen, owns=True))
+    screen.wait(lambda: screen.state.of(Closing).is_over)
 
 
 def test_closed_window_is_an_error_of_one_line(tmp_path):

@@ -77,6 +77,9 @@ class Live:
     placements and visibility, actors added to or removed from ``scene.actors``, and ``scene.time``.
     """
 
+    _owns = False
+    """Whether the window closes when the connection ends, even if the program was killed."""
+
     def __init__(self, path: str | Path | None = None) -> None:
         self.scene = Scene([])
         """The actors that this program shows; those of others are fetched by ``live[name]``."""
@@ -95,7 +98,8 @@ class Live:
     def _hello(self, path: str | Path | None) -> None:
         known = read_file(file_path(path))
         assert known is not None  # as it has been connected
-        self._ask("hello", {"version": VERSION, "token": known.token})
+        facts = {"version": VERSION, "token": known.token, "owns": self._owns}
+        self._ask("hello", facts)
 
     @property
     def is_open(self) -> bool:
@@ -309,6 +313,8 @@ class Live:
 
 class Window(Live):
     """A window that this program has opened in another process; it closes with the program."""
+
+    _owns = True
 
     def __init__(self, scene: Scene, **facts: Any) -> None:
         check_type("scene", scene, Scene)

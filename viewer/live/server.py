@@ -209,17 +209,18 @@ class Server:
             threading.Thread(target=self._serve, args=(client,), daemon=True).start()
 
     def _serve(self, client: socket.socket) -> None:
-        """Answer one client until it leaves; what it has sent stays."""
+        """Answer one client until it leaves; what it has sent stays, unless it owns the window."""
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client.settimeout(_FIRST_SECONDS)
         self.counts.clients += 1
         try:
-            receive, is_known = receiver(client), False
+            receive, is_known, owns = receiver(client), False, False
             while not self._is_over:
                 try:
                     message = read(receive) if is_known else read(receive, FIRST)
                     self.counts.messages += 1
                     answer = self._answer(message) if is_known else self._greet(message)
+                    owns |= message.do == "hello" and message.facts.get("owns") is True
                     is_known = True
                     client.settimeout(None)
                 except (EOFError, OSError):
@@ -238,6 +239,8 @@ class Server:
             self.counts.clients -= 1
             self._clients.discard(client)
             client.close()
+            if owns:
+                self._requests.put(Request(Message("close", {}), None))
             self.wake()
 
     def _greet(self, message: Message) -> Message:
