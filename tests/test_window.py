@@ -22,7 +22,7 @@ from x11_clipboard import offer_clipboard, read_clipboard
 import viewer
 from viewer.app.view.picks import vertex_at
 from viewer.app.window import Rest
-from viewer.errors import ViewerError
+from viewer.errors import RenderError, ViewerError
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.inspection.front import guess_front
@@ -448,6 +448,19 @@ def test_window_of_a_program_without_a_display_is_an_error(monkeypatch):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(ViewerError, match="no display found"):
         viewer.show(viewer.load(), block=False)
+
+
+def test_window_that_failed_says_why(display, tmp_path, monkeypatch, capsys):
+    for name in ("STATE", "CONFIG"):
+        monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name))
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("MESA_GL_VERSION_OVERRIDE", "3.1")
+    monkeypatch.setenv("LIBGL_ALWAYS_SOFTWARE", "1")
+    with viewer.show(viewer.load(), block=False) as window:
+        _wait_for(lambda: not window.is_open, "the end of the window")
+        with pytest.raises(RenderError, match="OpenGL"):
+            window.update()
+        _wait_for(lambda: "OpenGL" in capsys.readouterr().err, "the message")
 
 
 def test_awaited_event_is_followed_by_frames_showing_it():

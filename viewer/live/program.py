@@ -50,6 +50,10 @@ _ANSWER_SECONDS = 90.0  # longer than a window may take
 _CLOSE_SECONDS = 5.0
 
 
+class _ClosedError(ViewerError):
+    """The window was closed by the user or this program."""
+
+
 class _Look(NamedTuple):
     """How an actor is drawn."""
 
@@ -87,6 +91,7 @@ class Live:
         self._time: float | None = None
         self._lock = threading.RLock()
         self._is_over = threading.Event()
+        self._loss: ViewerError = _ClosedError("the window was closed")
         self._problem = ""
         self._socket = _connected(file_path(path))
         self._receive = receiver(self._socket)
@@ -275,8 +280,11 @@ class Live:
                 self._socket.sendall(data)
                 answer = read(self._receive)
             except (OSError, EOFError):
+                self._lose()
+                raise self._loss from None
+            except BaseException:  # such as Ctrl-C: a part of a message may remain in the stream
                 self._leave()
-                raise ViewerError("the window was closed") from None
+                raise
         if answer.do == "error":
             raise ViewerError(f"{do}: {answer.text('text')}")
         return answer
@@ -285,9 +293,9 @@ class Live:
         """Raise if the window was closed, also if nothing has been sent since."""
         # Between an answer and the next message, only the end of the stream can arrive.
         if self.is_open and self._arrivals.select(0.0):
-            self._leave()
+            self._lose()
         if not self.is_open:
-            raise ViewerError("the window was closed")
+            raise self._loss
 
     def _follow(self) -> None:
         """Look for changes until the connection ends."""
@@ -299,10 +307,17 @@ class Live:
                 continue  # until ``update`` has raised it
             try:
                 self.update()
+            except _ClosedError:
+                return
             except Exception as problem:  # handed to the next call of ``update``
+                told = told_of(problem)
+                sys.stderr.write(f"viewer: {told}\n")
                 if self.is_open:
-                    self._problem = told_of(problem)
-                    sys.stderr.write(f"viewer: {self._problem}\n")
+                    self._problem = told
+
+    def _lose(self) -> None:
+        """End the connection because the window has ended it."""
+        self._leave()
 
     def _leave(self) -> None:
         if self.is_open:
@@ -339,6 +354,14 @@ class Window(Live):
                 self._ask("close", {})
         self._leave()
         self._end()
+
+    def _lose(self) -> None:
+        """End the connection, and find out whether the window has failed."""
+        super()._lose()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            code = self._process.wait(_CLOSE_SECONDS)
+            if code != 0:
+                self._loss = _failure(self._folder, code)
 
     def _end(self) -> None:
         """Wait for the process, and end it if it does not end by itself."""
@@ -415,15 +438,20 @@ def _waited(process: subprocess.Popen[bytes], folder: Path) -> Path:
     while not path.exists():
         code = process.poll()
         if code is not None:
-            lines = (folder / "errors.txt").read_text("utf-8", "replace").splitlines()
-            told = (lines or [f"exit code {code}"])[-1].removeprefix("viewer: ")
-            kind = RenderError if code == RenderError.exit_code else ViewerError
-            raise kind(told.removeprefix("error: "))
+            raise _failure(folder, code)
         if time.monotonic() > deadline:
             process.kill()
             raise ViewerError(f"the window did not start within {_START_SECONDS:.0f} s")
         time.sleep(0.01)
     return path
+
+
+def _failure(folder: Path, code: int) -> ViewerError:
+    """Return the error with which the process of a window ended."""
+    lines = (folder / "errors.txt").read_text("utf-8", "replace").splitlines()
+    told = (lines or [f"exit code {code}"])[-1].removeprefix("viewer: ")
+    kind = RenderError if code == RenderError.exit_code else ViewerError
+    return kind(told.removeprefix("error: "))
 
 
 def _sendable(actor: Actor) -> Actor:
