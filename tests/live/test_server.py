@@ -234,6 +234,19 @@ def test_only_the_user_on_this_machine_gets_in(screen):
     assert screen.server.counts.refused == 4
 
 
+def test_client_without_the_token_may_not_stay_however_slowly_it_sends(screen, monkeypatch):
+    monkeypatch.setattr("viewer.live.server._FIRST_SECONDS", 0.2)
+    began = time.monotonic()
+    with (
+        socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream,
+        pytest.raises(OSError),
+    ):
+        for each in hello(screen):
+            stream.sendall(bytes([each]))
+            time.sleep(0.05)
+    assert time.monotonic() - began < 5.0
+
+
 def test_file_that_others_can_read_is_refused(screen):
     screen.path.chmod(0o644)
     with pytest.raises(ViewerError, match="only you can read"):

@@ -16,6 +16,7 @@ import json
 import math
 import socket
 import struct
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias, TypeGuard
 
@@ -216,12 +217,18 @@ def _shown(value: object) -> str:
     return printable(repr(value), 60)
 
 
-def receiver(stream: socket.socket) -> Callable[[int], bytes]:
-    """Return a function that receives a number of bytes; ``EOFError`` at the end of the stream."""
+def receiver(stream: socket.socket, seconds: float | None = None) -> Callable[[int], bytes]:
+    """Return a function that receives a number of bytes; ``EOFError`` at the end of the stream.
+
+    ``TimeoutError`` once it has received for some seconds in all, from now on.
+    """
+    deadline = None if seconds is None else time.monotonic() + seconds
 
     def receive(size: int) -> bytes:
         data = bytearray()
         while len(data) < size:
+            if deadline is not None:
+                stream.settimeout(max(deadline - time.monotonic(), 1e-3))
             part = stream.recv(min(size - len(data), _BLOCK))
             if not part:
                 raise EOFError

@@ -210,19 +210,20 @@ class Server:
 
     def _serve(self, client: socket.socket) -> None:
         """Answer one client until it leaves; what it has sent stays, unless it owns the window."""
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        client.settimeout(_FIRST_SECONDS)
         self.counts.clients += 1
         try:
-            receive, is_known, owns = receiver(client), False, False
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            # However slowly a client sends, it does not occupy a place for long without the token.
+            receive, is_known, owns = receiver(client, _FIRST_SECONDS), False, False
             while not self._is_over:
                 try:
                     message = read(receive) if is_known else read(receive, FIRST)
                     self.counts.messages += 1
                     answer = self._answer(message) if is_known else self._greet(message)
                     owns |= message.do == "hello" and message.facts.get("owns") is True
-                    is_known = True
-                    client.settimeout(None)
+                    if not is_known:
+                        is_known, receive = True, receiver(client)
+                        client.settimeout(None)
                 except (EOFError, OSError):
                     return
                 except Exception as problem:  # handed to the client, whose mistake it may be
