@@ -213,6 +213,27 @@ def test_window_closes_when_the_program_that_owns_it_is_killed(screen):
     screen.wait(lambda: screen.state.of(Closing).is_over)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
+def test_fork_of_a_program_is_not_connected(screen, live):
+    first = live["first"]
+    for _ in range(5):
+        first.pose.figure_translation[1] += 1.0
+        child = os.fork()
+        if child == 0:
+            code = 1
+            try:
+                first.pose.figure_translation[1] = 99.0
+                live.update()
+            except ViewerError:
+                code = 0
+            finally:
+                os._exit(code)
+        assert os.waitpid(child, 0)[1] == 0
+        live.update()
+    screen.wait(is_at(screen, [2.0, 5.0, 0.0]))
+
+
 def test_closed_window_is_an_error_of_one_line(tmp_path):
     with screen_at(tmp_path / "window.json") as screen:
         live = viewer.connect(screen.path)

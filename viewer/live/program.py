@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -98,6 +99,7 @@ class Live:
         self._arrivals = selectors.DefaultSelector()
         self._arrivals.register(self._socket, selectors.EVENT_READ)
         self._hello(path)
+        _CONNECTIONS.add(self)
         threading.Thread(target=self._follow, name="live", daemon=True).start()
 
     def _hello(self, path: str | Path | None) -> None:
@@ -319,6 +321,13 @@ class Live:
         """End the connection because the window has ended it."""
         self._leave()
 
+    def _leave_to_parent(self) -> None:
+        """Let go of the connection in a fork, whose messages would mix with those of its parent."""
+        # The thread that may hold the locks does not exist here.
+        self._lock, self._is_over = threading.RLock(), threading.Event()
+        self._loss = _ClosedError("expected the process that opened the connection, found a fork")
+        self._leave()
+
     def _leave(self) -> None:
         if self.is_open:
             self._is_over.set()
@@ -371,6 +380,19 @@ class Window(Live):
             self._process.terminate()
             self._process.wait(_CLOSE_SECONDS)
         shutil.rmtree(self._folder, ignore_errors=True)
+
+
+_CONNECTIONS: weakref.WeakSet[Live] = weakref.WeakSet()
+"""All connections of this process."""
+
+
+def _after_fork() -> None:
+    for live in _CONNECTIONS:
+        live._leave_to_parent()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def connect(path: str | Path | None = None) -> Live:
