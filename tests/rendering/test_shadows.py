@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rendering.drawn_figures import (
+    arm,
+    bent,
     picture,
     random_figure,
     random_pose,
@@ -88,6 +90,34 @@ def test_ground_is_dark_only_in_the_part_of_the_map_with_casters(offscreen, monk
     whole = draw(offscreen, *how)
     assert 0.0 < max(areas) < 0.4
     assert np.abs(part.astype(int) - whole).max() <= 1 and (whole[..., 3] > 30).any()
+
+
+@pytest.mark.parametrize("bones", ["octahedra", "sticks", "axes", "boxes"])
+@pytest.mark.parametrize("count", [1, lineup.FEWEST])
+def test_no_bone_reaches_beyond_the_part_of_the_map_with_casters(
+    offscreen, monkeypatch, bones, count
+):
+    """Ends at the tips of a hand reach farthest from joints; folded, its joints are close."""
+    shadows = []
+
+    def drawn(self, *args):
+        shadow = original(self, *args)
+        texels = np.frombuffer(shadow.texture.read(), np.float32).reshape(self.side, self.side)
+        cast = np.argwhere(texels < 1.0)[:, ::-1]
+        low, high = cast.min(axis=0) / self.side, (cast.max(axis=0) + 1) / self.side
+        shadows.append((shadow.low - low, high - shadow.high, 1.0 / self.side))
+        return shadow
+
+    original = shadow_passes.ShadowPass.draw
+    monkeypatch.setattr(shadow_passes.ShadowPass, "draw", drawn)
+    figure = replace(arm(3), skeleton=replace(arm(3).skeleton, boxes=None))
+    options = DisplayOptions(show="skeleton", bones=bones, quality="normal")
+    for angle in (0.0, 1.5, 3.1):
+        actors = [bent(figure, (1, "z", angle), (2, "x", angle)) for _ in range(count)]
+        offscreen.render(Scene(actors), (N, N), front(), options, GROUND)
+    assert len(shadows) == 3
+    for below, above, texel in shadows:
+        assert max(below.max(), above.max()) <= texel  # pixels are drawn whole
 
 
 def test_shadow_falls_on_another_figure(offscreen):

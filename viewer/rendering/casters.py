@@ -20,7 +20,7 @@ from viewer.rendering.joint_spheres import (
 from viewer.rendering.lineup import Lineup, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
-from viewer.rendering.passes.joint_pass import draw_joints, joint_program
+from viewer.rendering.passes.joint_pass import draw_joints, joint_program, skeleton_size
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.view import View
@@ -34,7 +34,7 @@ from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped, shaped_skeleton
 from viewer.rigs.skeleton import Skeleton
 
-_BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
+_BONE = 0.075  # how far ends, axes and half-widths reach, relative to the skeleton's size at rest
 _sizes: Memo[Figure, float] = Memo()
 
 
@@ -179,11 +179,7 @@ def _joint_spheres(figure: Figure, skeleton: Skeleton, world: Floats) -> Floats:
     """Return spheres (A, N, 4) around bones and joint boxes of world matrices (A, J, 4, 4)."""
     entries = np.moveaxis(world, (-1, -2, -3), (0, 1, 2))  # columns, rows, joints, poses
     places = entries[3, :3]
-    sizes = np.linalg.norm(np.ptp(places, axis=1), axis=0)
-    # Used if all joints coincide.
-    size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
-    thick = _BONE * np.where(sizes > 0.0, sizes, size or 1.0)
-    bones = np.concatenate([places, np.broadcast_to(thick, (1, *places.shape[1:]))])
+    bones = np.concatenate([places, np.full_like(places[:1], _BONE * skeleton_size(figure))])
     if skeleton.boxes is None:
         return bones.T
     middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)

@@ -18,7 +18,7 @@ from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.kinematics import posed_skeleton, world_matrices
-from viewer.rigs.memo import NumberKey
+from viewer.rigs.memo import Memo, NumberKey
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.motion.instances import worlds
 from viewer.rigs.pose import Pose, batch_last, rest_pose
@@ -35,6 +35,7 @@ _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # size of the cubes of a skeleton without boxes, as a fraction of its size
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
+_sizes: Memo[Figure, float] = Memo()
 
 
 class SkeletonBuffers:
@@ -56,7 +57,7 @@ class SkeletonBuffers:
 
         skeleton = figure.require_skeleton()
         self.context, self.figure, self.colors = context, figure, colors
-        self._size = _size(figure)
+        self._size = skeleton_size(figure)
         boxes = np.tile(_joint_boxes(skeleton, self._size), (len(colors), 1, 1))
         painted = actor_colors(joint_colors(skeleton.n_joints), colors)
         self.boxes = BoxBuffers(context, cube, boxes, painted.reshape(-1, 3))
@@ -247,8 +248,12 @@ def _draw_instances(program: moderngl.Program, boxes: BoxBuffers) -> None:
     array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=boxes.count)
 
 
-def _size(figure: Figure) -> float:
+def skeleton_size(figure: Figure) -> float:
     """Return the size of a skeleton at rest, or of the mesh if all joints coincide."""
+    return _sizes.get(figure, None, lambda: _size(figure))
+
+
+def _size(figure: Figure) -> float:
     skeleton = figure.require_skeleton()
     points = world_matrices(skeleton, rest_pose(skeleton))[shown_joints(skeleton), :3, 3]
     size = box_size(bounding_box(points))
