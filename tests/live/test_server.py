@@ -431,6 +431,19 @@ def test_error_of_the_thread_is_raised_by_update(screen, live, capsys, name):
     live.update()
 
 
+def test_window_goes_on_once_a_pose_fits_again(screen, live, monkeypatch, capsys):
+    monkeypatch.setattr("viewer.live.program._RETRY_SECONDS", 0.02)
+    first = live["first"]
+    first.pose.figure_translation[1] = np.nan
+    deadline = time.monotonic() + 10
+    while screen.server.counts.refused < 3 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    first.pose.figure_translation[1] = 3.0
+    screen.wait(is_at(screen, [2.0, 3.0, 0.0]))
+    live.update()
+    assert capsys.readouterr().err.count("finite") == 1
+
+
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 def test_folder_that_others_can_write_is_refused(tmp_path, monkeypatch):
     monkeypatch.delenv("VIEWER_CONNECTION_FILE", raising=False)

@@ -46,6 +46,7 @@ from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.shape import shaped
 
 _RATE = 60.0  # times per second at which changes are looked for
+_RETRY_SECONDS = 1.0  # after which changes that were refused are sent again
 _START_SECONDS = 60.0  # in which a new window must listen
 _ANSWER_SECONDS = 90.0  # longer than a window may take
 _CLOSE_SECONDS = 5.0
@@ -94,6 +95,7 @@ class Live:
         self._is_over = threading.Event()
         self._loss: ViewerError = _ClosedError("the window was closed")
         self._problem = ""
+        """Error with which the thread's last look ended."""
         self._socket = _connected(file_path(path))
         self._receive = receiver(self._socket)
         self._arrivals = selectors.DefaultSelector()
@@ -184,22 +186,27 @@ class Live:
             self.update()
 
     def update(self) -> None:
-        """Send all changes now, and wait until the window has them; raises errors of the thread."""
+        """Send all changes now, and wait until the window has them; raises if one does not fit."""
         with self._lock:
-            problem, self._problem = self._problem, ""
-            if problem:
-                raise ViewerError(problem)
             self._require_open()
-            for actor in [each for each in self._sent if each not in self.scene.actors]:
-                self._ask("remove", {"actor": self._sent[actor].number})
-                del self._sent[actor]
-            for actor in [*self.scene.actors]:
-                self._send_object(actor)
-            if self.scene.time is not None and self.scene.time != self._time:
-                self._ask("time", {"time": float(self.scene.time)})
-                self._time = self.scene.time
-            for actor, sent in self._sent.items():
-                self._send_changes(actor, sent)
+            try:
+                self._send_all()
+            except ViewerError:
+                raise
+            except Exception as problem:  # a value that cannot be converted
+                raise ViewerError(told_of(problem)) from problem
+
+    def _send_all(self) -> None:
+        for actor in [each for each in self._sent if each not in self.scene.actors]:
+            self._ask("remove", {"actor": self._sent[actor].number})
+            del self._sent[actor]
+        for actor in [*self.scene.actors]:
+            self._send_object(actor)
+        if self.scene.time is not None and self.scene.time != self._time:
+            self._ask("time", {"time": float(self.scene.time)})
+            self._time = self.scene.time
+        for actor, sent in self._sent.items():
+            self._send_changes(actor, sent)
 
     def _send_object(self, actor: Actor) -> None:
         """Send an actor that is new or has another figure or motion."""
@@ -303,19 +310,18 @@ class Live:
         """Look for changes until the connection ends."""
         due = time.monotonic()
         while not self._is_over.wait(max(due - time.monotonic(), 0.0)):
-            # A look that took long is not made up for.
-            due = max(due + 1.0 / _RATE, time.monotonic())
-            if self._problem:
-                continue  # until ``update`` has raised it
             try:
                 self.update()
+                self._problem = ""
+                # A look that took long is not made up for.
+                due = max(due + 1.0 / _RATE, time.monotonic())
             except _ClosedError:
                 return
-            except Exception as problem:  # handed to the next call of ``update``
-                told = told_of(problem)
-                sys.stderr.write(f"viewer: {told}\n")
-                if self.is_open:
-                    self._problem = told
+            except ViewerError as problem:
+                if str(problem) != self._problem:
+                    self._problem = str(problem)
+                    sys.stderr.write(f"viewer: {problem}\n")
+                due = time.monotonic() + _RETRY_SECONDS
 
     def _lose(self) -> None:
         """End the connection because the window has ended it."""
@@ -329,10 +335,11 @@ class Live:
         self._leave()
 
     def _leave(self) -> None:
-        if self.is_open:
-            self._is_over.set()
-            self._arrivals.close()
-            self._socket.close()
+        with self._lock:  # the thread may be about to use them
+            if self.is_open:
+                self._is_over.set()
+                self._arrivals.close()
+                self._socket.close()
 
 
 class Window(Live):
