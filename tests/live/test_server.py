@@ -444,6 +444,15 @@ def test_window_goes_on_once_a_pose_fits_again(screen, live, monkeypatch, capsys
     assert capsys.readouterr().err.count("finite") == 1
 
 
+def test_moving_a_body_does_not_compute_its_shape_again(screen, live, monkeypatch):
+    shapes = BlendShapes(("height",), np.ones((1, 3, 3)), space=Upwards())
+    actor = live.add(replace(bar(), blend_shapes=shapes))
+    monkeypatch.setattr("viewer.live.program.shaped", None)
+    actor["joint_1"] = [0.0, 0.0, QUARTER]
+    live.update()
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+
+
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 def test_folder_that_others_can_write_is_refused(tmp_path, monkeypatch):
     monkeypatch.delenv("VIEWER_CONNECTION_FILE", raising=False)

@@ -237,7 +237,7 @@ class Live:
         key = sent.pose.updated(*_numbers(pose))
         if key is sent.pose:
             return
-        shown = _sendable(actor).own_pose or pose
+        shown = _without_shapes(pose) if _needs_files(actor) else pose
         facts = {"actor": sent.number, "figure_scale": float(pose.figure_scale)}
         self._ask("pose", facts, [np.asarray(getattr(shown, name), float) for name in POSE])
         sent.pose = key
@@ -483,21 +483,29 @@ def _failure(folder: Path, code: int) -> ViewerError:
     return kind(told.removeprefix("error: "))
 
 
+def _needs_files(actor: Actor) -> bool:
+    """Return whether the shapes of an actor are computed from the files of a model."""
+    shapes = actor.figure.blend_shapes
+    return shapes is not None and shapes.space is not None
+
+
 def _sendable(actor: Actor) -> Actor:
     """Return an actor as it is sent; shapes that need the files of a model are applied to it."""
-    figure, pose = actor.figure, actor.own_pose
-    shapes = figure.blend_shapes
-    if shapes is None or shapes.space is None or pose is None:
+    pose = actor.own_pose
+    if pose is None or not _needs_files(actor):
         return actor
-    figure = replace(shaped(figure, pose.shape_weights), blend_shapes=None)
-    return replace(actor, figure=figure, own_pose=replace(pose, shape_weights=np.zeros(0)))
+    figure = replace(shaped(actor.figure, pose.shape_weights), blend_shapes=None)
+    return replace(actor, figure=figure, own_pose=_without_shapes(pose))
+
+
+def _without_shapes(pose: Pose) -> Pose:
+    return replace(pose, shape_weights=np.zeros(0))
 
 
 def _content(actor: Actor) -> object:
     """Return a key of what is sent as a whole: the figure and the motion."""
-    shapes, pose = actor.figure.blend_shapes, actor.own_pose
-    is_applied = shapes is not None and shapes.space is not None and pose is not None
-    weights = pose.shape_weights.tobytes() if is_applied and pose is not None else b""
+    pose = actor.own_pose
+    weights = b"" if pose is None or not _needs_files(actor) else pose.shape_weights.tobytes()
     return actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights
 
 
