@@ -131,6 +131,16 @@ def test_doctor_lists_them(written, install):
     assert old == ("note", "bad 2.0: scalars area is not used: this program has its own")
 
 
+def test_of_two_packages_with_one_name_the_first_by_name_is_used(install):
+    install("zeta", [("formats", "xyz", "json")])
+    install("alpha", [("formats", ".XYZ", "no_such_module")])
+    (found,) = plugins_of("formats")
+    assert found.distribution == "alpha 0.1"
+    lines = [each.found for each in examine() if each.subject == "plug-in"]
+    assert lines[0].startswith("plug-in alpha 0.1 (formats xyz): cannot be imported")
+    assert lines[1:] == ["zeta 0.1: formats xyz is not used: that of alpha 0.1 is"]
+
+
 def plugin_lines(install):
     points = [("formats", "xyz", "no_such_module"), ("scalars", "area", "json:dumps")]
     install("bad", points, version="2.0")

@@ -102,6 +102,14 @@ def added_to(group: Group, own: Collection[str]) -> tuple[Plugin, ...]:
 
 def plugins_of(group: Group) -> tuple[Plugin, ...]:
     """Return the plug-ins of a registry, by name; of several with one name, the first."""
+    first: dict[str, Plugin] = {}
+    for found in installed_plugins(group):
+        first.setdefault(found.name, found)
+    return tuple(first.values())
+
+
+def installed_plugins(group: Group) -> tuple[Plugin, ...]:
+    """Return the plug-ins of a registry, by name and distribution, with those of equal names."""
     return _installed(group) if _is_enabled else ()
 
 
@@ -125,13 +133,13 @@ def without_plugins() -> Iterator[None]:
 def _installed(group: Group) -> tuple[Plugin, ...]:
     from importlib.metadata import entry_points
 
-    found: dict[str, Plugin] = {}
-    for each in sorted(entry_points(group=f"viewer.{group}"), key=lambda each: each.name):
+    found = []
+    for each in entry_points(group=f"viewer.{group}"):
         # A suffix is also written as ".off" or "OFF".
         is_suffix = group in ("formats", "exporters")
         name = each.name.lower().removeprefix(".") if is_suffix else each.name
         package = "of an unknown package"
         if each.dist is not None:
             package = f"{each.dist.metadata['Name']} {each.dist.version}"
-        found.setdefault(name, Plugin(group, name, each.value.strip(), printable(package, 100)))
-    return tuple(found.values())
+        found.append(Plugin(group, name, each.value.strip(), printable(package, 100)))
+    return tuple(sorted(found, key=lambda each: (each.name, each.distribution)))

@@ -24,7 +24,7 @@ from viewer.commands._printing import print_line
 from viewer.data_classes import dataclass
 from viewer.errors import PluginError, RenderError
 from viewer.phrases import counted, printable
-from viewer.plugins import GROUPS, Group, plugins_of
+from viewer.plugins import GROUPS, Group, installed_plugins, plugin_of
 
 if TYPE_CHECKING:
     from viewer.rendering.offscreen import Offscreen
@@ -138,14 +138,18 @@ def _examine_packages() -> Iterator[_Finding]:
 def _examine_plugins() -> Iterator[_Finding]:
     """List plug-ins by package; each is imported, to see that it can be used."""
     found: dict[str, list[str]] = {}
-    for plugin in (each for group in GROUPS for each in plugins_of(group)):
+    for plugin in (each for group in GROUPS for each in installed_plugins(group)):
+        unused = f"{plugin.distribution}: {plugin.group} {plugin.name} is not used"
+        used = plugin_of(plugin.group, plugin.name)
+        if used is not None and used is not plugin:
+            yield _Finding("plug-in", "note", f"{unused}: that of {used.distribution} is")
+            continue
         try:
             plugin.load()
         except PluginError as problem:
             yield _Finding("plug-in", "missing", str(problem))
             continue
         if plugin.name in _own_keys(plugin.group):
-            unused = f"{plugin.distribution}: {plugin.group} {plugin.name} is not used"
             yield _Finding("plug-in", "note", f"{unused}: this program has its own")
             continue
         found.setdefault(plugin.distribution, []).append(f"{plugin.group} {plugin.name}")
