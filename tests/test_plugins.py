@@ -331,8 +331,9 @@ def test_check_of_a_plugin_is_run_and_listed(install, tmp_path, monkeypatch, cap
         ("W001", "pass", 'expected codes of "P" and other capitals'),
         ("PNAME2", "1 / 0", "failed: ZeroDivisionError"),
         ("PNAME3", "yield 3", "expected findings of its own codes, found 3"),
+        ("PNAME4", "yield subject.found('PNAME4: {x} is no name')", "failed: KeyError: 'x'"),
     ],
-    ids=["taken", "exception", "result"],
+    ids=["taken", "exception", "result", "value"],
 )
 def test_error_of_a_check_names_its_package(code, body, message, install, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -340,6 +341,28 @@ def test_error_of_a_check_names_its_package(code, body, message, install, tmp_pa
     with pytest.raises(PluginError) as problem:
         viewer.lint("fox.obj")
     assert str(problem.value).startswith(f"plug-in names 0.1 (checks names): {message}")
+
+
+@pytest.mark.parametrize(
+    ("codes", "message"),
+    [
+        ("3", "expected CODES to be a dict, found 3"),
+        (
+            "{'PSOME': 3}",
+            "expected a Code with a severity of note, warning, error for 'PSOME', fou",
+        ),
+        ("{'PSOME': Code('bad', 'a', 'b')}", "expected a Code with a severity of note, warning"),
+        ("{5: Code('note', 'a', 'b')}", 'expected codes of "P" and other capitals'),
+    ],
+    ids=["table", "row", "severity", "name"],
+)
+def test_wrong_codes_of_a_check_are_refused(codes, message, install, tmp_path, capsys):
+    place = install("names", [("checks", "names", "check_names")])
+    text = f"from viewer.linting import Code\nCODES = {codes}\ndef check(subject): return []\n"
+    (place / "check_names.py").write_text(text)
+    assert run(["lint", "--codes"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"viewer: plug-in names 0.1 (checks names): {message}")
 
 
 TOOL = """

@@ -10,7 +10,7 @@ from importlib import import_module
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import CODES
+from viewer.diagnostics import CODES, SEVERITIES, Code
 from viewer.errors import FormatError
 from viewer.linting._finding import Finding, LintOptions
 from viewer.linting._subject import Subject, counting_of
@@ -74,8 +74,13 @@ def used_checks() -> dict[str, Check]:
         found[plugin.name] = getattr(module, "CHECK", Check(plugin.name))
         if not isinstance(found[plugin.name], Check):
             raise plugin.error(f"expected CHECK to be a Check, found {found[plugin.name]!r:.80}")
+        if not isinstance(module.CODES, dict):
+            raise plugin.error(f"expected CODES to be a dict, found {module.CODES!r:.80}")
         for name, code in module.CODES.items():
-            if not (_PLUGGED_CODE.fullmatch(name) and CODES.setdefault(name, code) == code):
+            if not isinstance(code, Code) or code.severity not in SEVERITIES:
+                wanted = f"expected a Code with a severity of {', '.join(SEVERITIES)}"
+                raise plugin.error(f"{wanted} for {name!r:.40}, found {code!r:.80}")
+            if not (_PLUGGED_CODE.fullmatch(str(name)) and CODES.setdefault(name, code) == code):
                 raise plugin.error(
                     'expected codes of "P" and other capitals or digits, which no other plug-in '
                     f"has, found {name!r:.40}"
@@ -92,9 +97,10 @@ def _findings(name: str, subject: Subject) -> list[Finding]:
     module = plugin.load()
     with plugin.guarded("failed"):
         found = [*module.check(subject)]
-    for finding in found:
-        if not isinstance(finding, Finding) or finding.code not in module.CODES:
-            raise plugin.error(f"expected findings of its own codes, found {finding!r:.80}")
+        for finding in found:
+            if not isinstance(finding, Finding) or finding.code not in module.CODES:
+                raise plugin.error(f"expected findings of its own codes, found {finding!r:.80}")
+            str(finding.diagnostic)  # fails if a value of its sentence is missing
     return found
 
 
