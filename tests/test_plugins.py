@@ -290,6 +290,10 @@ def test_error_of_an_exporter_names_its_package(changes, message, install, tmp_p
         viewer.export(viewer.load("fox")[0], "a.vl")
     assert str(problem.value).startswith(f"plug-in lists 0.1 (exporters vl): {message}")
     assert not Path("a.vl").exists()
+    Path("a.vl").write_text("of before")  # is no sign that something was written, and is kept
+    with pytest.raises(PluginError, match=re.escape(message)):
+        viewer.export(viewer.load("fox")[0], "a.vl")
+    assert Path("a.vl").read_text() == "of before"
 
 
 CHECK = """

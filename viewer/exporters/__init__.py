@@ -209,8 +209,8 @@ def _find_plugin(suffix: str) -> None:
         EXPORTERS.pop(suffix, None)  # plug-ins have been switched off since
         return
     row = plugin.load().EXPORTER
-    if not isinstance(row, Exporter) or row.suffixes != (suffix,) or row.joints:
-        wanted = f'expected EXPORTER to be an Exporter of ("{suffix}",), of any joints'
+    if not isinstance(row, Exporter) or row.suffixes != (suffix,) or row.joints or row.folder:
+        wanted = f'expected EXPORTER to be an Exporter of ("{suffix}",), of any joints, of files'
         raise plugin.error(f"{wanted}, found {row!r:.80}")
     EXPORTERS[suffix] = row
 
@@ -222,6 +222,8 @@ def _write(key: str, selection: Selection, path: Path, options: ExportOptions) -
         return list[Diagnostic](module.export(selection, path, options))
     plugin = plugin_of("exporters", key[1:])
     assert plugin is not None  # as its row is in ``EXPORTERS``
+    if path.is_file():
+        path.resolve().unlink()  # ``all_or_none`` restores it unless the plug-in writes another
     with plugin.guarded(f"cannot write {printable(path, 300)}"):
         notes = [*plugin.load().export(selection, path, options)]
     if not all(isinstance(each, Diagnostic) for each in notes) or not path.is_file():
