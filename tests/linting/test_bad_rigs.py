@@ -418,7 +418,10 @@ def test_skeleton_that_moves_on_its_head_is_upside_down(flip, expected):
 
 
 def tube(weight: Callable[[np.ndarray], np.ndarray]) -> Figure:
-    """Return a tube of radius 0.1 along x with a wrist at 0; ``weight`` (N,) at x, -1 to 1."""
+    """Return a tube of radius 0.1 along x with a wrist at 0.
+
+    ``weight``: (N,) at x, -1 to 1. It is that of the wrist; from 1 to 2, the hand takes over.
+    """
     x, angle = np.meshgrid(np.linspace(-1.0, 1.0, 41), np.arange(12) * np.pi / 6, indexing="ij")
     points = np.stack([x, 0.1 * np.cos(angle), 0.1 * np.sin(angle)], axis=-1).reshape(-1, 3)
     ring, step = np.divmod(np.arange(40 * 12), 12)
@@ -429,7 +432,10 @@ def tube(weight: Callable[[np.ndarray], np.ndarray]) -> Figure:
     binds = np.tile(np.eye(4), (4, 1, 1))
     binds[:, :3, 3] = -places
     weights = weight(points[:, 0])
-    rows = [[(1, 1.0 - w), (2, w)] for w in weights.tolist()]
+    rows = [
+        [(1, 1.0 - w), (2, w)] if w <= 1.0 else [(2, 2.0 - w), (3, w - 1.0)]
+        for w in weights.tolist()
+    ]
     skeleton = make_skeleton(names, [-1, 0, 1, 2], np.diff(places, axis=0, prepend=0.0))
     return Figure("tube", make_mesh(points, faces), skeleton, skin_from_lists(rows, binds))
 
@@ -452,6 +458,12 @@ def test_equal_weights_along_most_of_a_limb_are_found_where_they_lose_less():
     assert found.diagnostic.key == "W017.equal" and found.joints.tolist() == [2]
     # Rings are 0.05 apart: from -0.55 to 0.55, 23 of 12 vertices.
     assert len(found.vertices) == 23 * 12
+
+
+def test_joints_with_a_single_ring_each_blend_evenly():
+    """A limb of few vertices: half of the weight at the ring of a joint, all or none beside it."""
+    blend = tube(lambda x: np.select([x < -0.01, x < 0.01, x < 0.06], [0.0, 0.5, 1.5], 2.0))
+    assert linted(blend, (volumes,)) == []
 
 
 @pytest.mark.parametrize("up", ["y", "z"])

@@ -15,7 +15,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import descendants
-from viewer.rigs.mesh import area_vectors
+from viewer.rigs.mesh import Mesh, area_vectors
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.skin import Skin, bind_positions, merged, normalized, owners
@@ -33,10 +33,7 @@ _FEWEST = 24  # minimum number of triangles
 # has the same weight as its parent at one vertex, or at none.
 _SAME = 1e-3  # maximum difference of equal weights
 _EQUAL, _FEWEST_EQUAL = 0.5, 12  # minimum fraction of the joint's vertices, and their number
-_BOTH = (
-    0.9,
-    0.5,
-)  # minimum sum of both weights: of those that are equal, and of the joint's vertices
+_BOTH = 0.9, 0.5  # minimum sums of both weights: where they are equal, and where the joint counts
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -58,7 +55,7 @@ def check(subject: Subject) -> Iterator[Finding]:
         if parent >= 0 and meaning.endswith(_LIMBS):
             axis = places[joint] - places[parent]
             fraction, vertices = _twisted(figure, whole, joint, places[joint], axis)
-            halves = _equal(whole, joint, parent)
+            halves = _equal(figure.mesh, whole, joint, parent)
             if fraction > _LOST:
                 lost.append((fraction, joint))
                 blending.append(vertices)
@@ -94,13 +91,15 @@ def check(subject: Subject) -> Iterator[Finding]:
     )
 
 
-def _equal(skin: Skin, joint: int, parent: int) -> Indices:
+def _equal(mesh: Mesh, skin: Skin, joint: int, parent: int) -> Indices:
     """Return the vertices with equal weights of a joint and its parent, if most of its are so."""
     own, other = (
         np.bincount(owners(skin), np.where(skin.joints == each, skin.weights, 0.0), skin.n_vertices)
         for each in (joint, parent)
     )
-    are_equal = np.flatnonzero((np.abs(own - other) < _SAME) & (own + other > _BOTH[0]))
+    is_equal = (np.abs(own - other) < _SAME) & (own + other > _BOTH[0])
+    # A single ring, of which no triangle has all corners, is the middle of a transition.
+    are_equal = np.unique(mesh.triangles[is_equal[mesh.triangles].all(axis=1)])
     n_own = np.count_nonzero((own > _BLENDS) & (own + other > _BOTH[1]))
     is_usual = len(are_equal) < max(_FEWEST_EQUAL, _EQUAL * n_own)
     return are_equal[: 0 if is_usual else None]
