@@ -358,6 +358,12 @@ def test_actor_that_cannot_be_drawn_is_refused(screen, live, name, value):
     assert live.selection == ("first",)
 
 
+def test_figure_without_vertices_is_refused(live):
+    with pytest.raises(ViewerError, match="at least one vertex"):
+        live.add(viewer.figure(np.zeros((0, 3)), np.zeros((0, 3), int)))
+    assert live.selection == ("first",)
+
+
 def test_look_may_be_numbers_of_numpy(screen, live):
     color = np.array([1.0, 0.5, 0.0], np.float32)
     actor = live.add(viewer.Actor(bar(), color=color, visible=np.bool_(False)))

@@ -339,6 +339,8 @@ def _check(actor: Actor) -> None:
         raise MessageError(f"points: expected shape (N, 4), found {actor.points.shape}")
     if actor.clip is not None:
         pose_actors([actor.copy()], time_span([actor])[0])
+    if actor.figure.mesh is not None and actor.figure.mesh.n_vertices == 0:
+        raise MessageError("expected at least one vertex")
     if actor.figure.mesh is not None and actor.own_pose is not None:
         posed, _ = deform(actor.figure, actor.pose)
         if not np.isfinite(posed).all():
