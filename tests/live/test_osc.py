@@ -26,6 +26,11 @@ def test_examples_of_the_specification_are_written():
     assert message_bytes("/foo", 1000, -1, "hello", 1.234, 5.678) == FOO
 
 
+def test_numbers_beyond_single_precision_are_limited():
+    ((_, found),) = messages_of(message_bytes("/a", 1e39, -1e300))
+    assert found == pytest.approx((3.4028235e38, -3.4028235e38))
+
+
 def test_other_types_and_missing_tags_are_read():
     data = b"/a\0\0,TFNbd\0\0" + struct.pack(">i", 3) + b"xyz\0" + struct.pack(">d", 0.1)
     assert messages_of(data) == [("/a", (True, False, None, b"xyz", 0.1))]

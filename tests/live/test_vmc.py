@@ -172,6 +172,13 @@ def test_path_is_scaled_by_the_length_of_the_legs():
     assert found["Hips"] == pytest.approx((-1.0, 2.0, 0.0), abs=1e-6)
 
 
+def test_legs_without_length_do_not_scale_the_path():
+    figure, _ = dummy()
+    legs = (bone(f"Left{name}", place=(0.0, 1e-20, 0.0)) for name in ("LowerLeg", "Foot"))
+    found = posed(figure, bone("Hips", place=(0.5, 1.0, 0.0)), *legs)
+    assert found["Hips"] == pytest.approx((-0.5, 1.0, 0.0), abs=1e-6)
+
+
 def test_rotations_add_up_along_bones_that_the_figure_lacks():
     figure, _ = dummy()
     found = posed(
@@ -264,6 +271,9 @@ def test_sent_bones_have_the_axes_of_unity(kind):
         bone("LeftFoot", (0.0, 0.0, 0.0, 0.0)),
         bone("LeftFoot", (0.0, 0.0, 0.0, math.nan)),
         bone("LeftFoot", place=(math.inf, 0.0, 0.0)),
+        bone("Hips", place=(1e30, 0.0, 0.0)),
+        osc("/VMC/Ext/Root/Pos", "root", 0.0, -1e30, 0.0, *STILL),
+        osc("/VMC/Ext/Blend/Val", "Joy", 1e30),
         osc("/VMC/Ext/Blend/Val", "Joy"),
         osc("/VMC/Ext/T", "now"),
         bundle(bone("LeftFoot"), bone("LeftFoot", (2.0, 0.0, 0.0, 0.0))),

@@ -28,6 +28,7 @@ LARGEST = 65_507
 
 _BUNDLE = b"#bundle\0"
 _AT_ONCE = struct.pack(">Q", 1)  # the time tag for "immediately"
+_MOST = (2.0 - 2.0**-23) * 2.0**127  # largest number in single precision
 _DEEPEST = 4  # bundles within each other
 _NUMBERS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d", "r": ">I", "m": ">I", "c": ">I", "t": ">Q"}
 _PLAIN: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": None}
@@ -118,7 +119,7 @@ def message_bytes(address: str, *arguments: float | str) -> bytes:
         elif isinstance(each, int):
             tags, part = tags + "i", struct.pack(">i", each)
         else:
-            tags, part = tags + "f", struct.pack(">f", each)
+            tags, part = tags + "f", struct.pack(">f", min(max(each, -_MOST), _MOST))
         parts.append(part)
     return b"".join([_padded(address), _padded(tags), *parts])
 

@@ -60,6 +60,8 @@ _FLIP_PLACE = np.array([-1.0, 1.0, 1.0])
 _FLIP_TURN = np.array([1.0, -1.0, -1.0, 1.0])  # F R F of a quaternion (x, y, z, w)
 _MOST_EXPRESSIONS = 500
 _AGAIN = 0.25  # seconds after which an unchanged pose is sent again
+_MOST = 1e9  # largest coordinate in metres, and largest weight
+_SHORTEST = 1e-3  # metres; shorter legs of a performer do not scale its path
 _UNIT = 0.01  # error of the length of a unit quaternion, beyond that of single precision
 
 
@@ -177,7 +179,7 @@ def _after(
         case "/VMC/Ext/Blend/Val":
             if len(arguments) != 2 or not isinstance(arguments[0], str):
                 raise OscError("expected a name and a weight")
-            pending[arguments[0]] = _finite(arguments[1:])[0]
+            pending[arguments[0]] = _moderate(arguments[1:])[0]
             if len(pending) > _MOST_EXPRESSIONS:
                 raise OscError(f"expected at most {_MOST_EXPRESSIONS} expressions")
         case "/VMC/Ext/Blend/Apply":
@@ -197,6 +199,7 @@ def _place(arguments: Sequence[Any]) -> tuple[str, Place]:
     if len(arguments) < 8 or not isinstance(arguments[0], str):
         raise OscError("expected a name and seven numbers")
     numbers = np.array(_finite(arguments[1:8]))
+    _moderate(arguments[1:4])
     turn = numbers[3:] * _FLIP_TURN
     length = float(np.linalg.norm(turn))
     if abs(length - 1.0) > _UNIT:
@@ -209,6 +212,15 @@ def _finite(arguments: Sequence[Any]) -> list[float]:
         if isinstance(each, bool) or not isinstance(each, int | float) or not math.isfinite(each):
             raise OscError(f"expected finite numbers, found {printable(repr(each), 40)}")
     return [float(each) for each in arguments]
+
+
+def _moderate(arguments: Sequence[Any]) -> list[float]:
+    """Return numbers with which the pose and the vertices stay finite."""
+    numbers = _finite(arguments)
+    for each in numbers:
+        if abs(each) > _MOST:
+            raise OscError(f"expected numbers up to {_MOST:g}, found {each:g}")
+    return numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -296,7 +308,7 @@ def _place_hips(how: TPose, posed: Pose, given: Performance) -> None:
     # Longer legs make longer steps. Without the bones of the legs, sizes are taken as equal.
     steps = [given.bones.get(f"left{bone}") for bone in ("LowerLeg", "Foot")]
     theirs = sum(float(np.linalg.norm(each.position)) for each in steps if each is not None)
-    ratio = how.leg / theirs if all(steps) and theirs > 0.0 else 1.0
+    ratio = how.leg / theirs if all(steps) and theirs > _SHORTEST else 1.0
     wanted = ratio * (root.position + root.rotation @ hips.position)
     offset = how.axes.T @ (wanted - how.places["hips"]) / how.scale
     skeleton = shaped_skeleton(how.figure, posed.shape_weights)
