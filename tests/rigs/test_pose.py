@@ -137,6 +137,13 @@ def test_poses_refuse_values_that_are_not_those_of_whole_joints(values, n_dofs):
         Pose(values, n_dofs)
 
 
+@pytest.mark.parametrize("values", [[0] * 15, np.zeros(15, dtype=int), np.zeros(15, np.float32)])
+def test_values_of_a_pose_become_float64(values):
+    pose = Pose(values, 2)
+    pose.dofs[1] = 0.1
+    assert pose.values.tolist() == [0.0, 0.1, *[0.0] * 13]
+
+
 def test_copy_of_a_pose_shares_no_array():
     pose = rest_pose(euler_joint("x", [0.5]))
     other = pose.copy()

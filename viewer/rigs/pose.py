@@ -67,6 +67,7 @@ class Pose:
     _key: NumberKey | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
+        self.values = np.asarray(self.values, dtype=np.float64)
         of_joints = self.values.size - self.n_dofs - 3
         if self.values.ndim != 1 or self.n_dofs < 0 or of_joints < 0 or of_joints % _PER_JOINT:
             raise RigError(
