@@ -347,8 +347,10 @@ class Renderer:
         numbers = [number for number, actor in enumerate(group.actors) if actor is chosen]
         if joint >= 0 and numbers:
             joint += numbers[0] * skeleton.n_joints
-        how = joint if numbers else -1, skeleton.opacity(options) if overlays else 1.0, None
-        self.joint_pass.draw(skeleton, skeleton.placement, view, options, *how, overlays)
+        selected = joint if numbers else -1
+        opacity = skeleton.opacity(options) if overlays else 1.0
+        how = view, options, selected, opacity
+        self.joint_pass.draw(skeleton, skeleton.placement, *how, overlays=overlays)
 
     def _draw_skeleton(
         self,

@@ -170,19 +170,19 @@ def reduced(texels: Bytes, is_linear: bool) -> Iterator[Bytes]:
 
 
 def _sums_of_four(plane: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Return four times the means of the texels that those of half the size cover."""
+    """Return four times the mean of the texels that each texel of the next mipmap covers."""
     return _sums_of_two(_sums_of_two(plane).T).T
 
 
 def _sums_of_two(rows: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Return twice the means of the rows that those of half the number cover, at least one."""
+    """Return twice the mean of the rows that each row of the next mipmap covers."""
     count, half = len(rows), len(rows) // 2
     if count == 1:
         return 2 * rows
     if count % 2 == 0:
         return rows[0::2] + rows[1::2]
-    # Of 2 n + 1 rows, row k of n covers (2 n + 1) / n: the last n - k parts of n of one, a whole
-    # one, and the first k + 1 parts of a third (Guthe and Heckbert 2005).
+    # Of 2 n + 1 rows, row k of n covers (2 n + 1) / n: (n - k) / n of row 2 k, all of row 2 k + 1,
+    # and (k + 1) / n of row 2 k + 2 (Guthe and Heckbert 2005).
     parts, whole = np.arange(half, dtype=np.float32)[:, None], np.float32(half)
     sums = (whole - parts) * rows[0:-1:2] + whole * rows[1::2] + (parts + 1) * rows[2::2]
     return np.rint(sums * np.float32(2.0 / count)).astype(np.uint16)

@@ -260,9 +260,10 @@ def map_side(size: tuple[int, int]) -> int:
 
 
 def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float, Floats, Floats]:
-    """Return a directional light's view of spheres (N, 4), half its extent, and where they are.
+    """Return a directional light's view of spheres (N, 4), half its extent, and their bounds in it.
 
-    ``direction``: unit vector towards the light. Where they are: opposite corners, (2,), 0 to 1.
+    ``direction``: unit vector towards the light. The bounds are two opposite corners, (2,) each,
+    in the map, 0 to 1.
     """
     # Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
     # not crawl while figures move.
