@@ -340,6 +340,16 @@ def test_fault_is_found_at_its_joints_and_vertices(name):
     assert vertices is None or sorted(found.vertices.tolist()) == vertices
 
 
+def test_hands_of_crossed_arms_have_the_right_names():
+    across = [("wrist", [-0.8, 0.0, 0.3]), ("hand", [-0.8, 0.0, 0.3])]
+    moves = [
+        (f"{side}_{name}", [sign * x, y, z])
+        for side, sign in (("left", 1.0), ("right", -1.0))
+        for name, (x, y, z) in across
+    ]
+    assert linted(moved(*moves), (symmetry,)) == []
+
+
 def test_large_head_is_no_leak():
     assert linted(leak_everywhere(0.0), (stray_weights,)) == []
 

@@ -244,7 +244,12 @@ def _names(subject: Subject, figure: Figure, plane: _Plane) -> Iterator[Finding]
     sides = np.array([_SIDES[side] for side, _ in sided_words(skeleton.names)])
     signs = np.where(np.abs(places) > _ASKEW * subject.size(), np.sign(places), 0.0) * sides
     usual = np.sign(signs.sum())
-    wrong = np.flatnonzero(signs * usual < 0.0)
+    is_beyond = signs * usual < 0.0
+    # Hands of crossed arms are beyond the plane, but their parents are named after the same side.
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0 and sides[joint] == sides[parent] and not is_beyond[parent]:
+            is_beyond[joint] = False
+    wrong = np.flatnonzero(is_beyond)
     if len(wrong) == 0 or len(wrong) > _FEWER * np.count_nonzero(signs):
         return
     labels = joint_labels(skeleton)
