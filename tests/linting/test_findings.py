@@ -356,6 +356,13 @@ def test_influence_limit_error_is_the_vertex_displacement():
     assert told([found.diagnostic]) == [("W007.influences", values)]
 
 
+def test_limits_of_two_turns_that_are_rounded_up_are_in_radians():
+    skeleton = column().skeleton
+    limits = np.full_like(skeleton.dof_limits, [-12.57, 12.57])
+    figure = replace(column(), skeleton=replace(skeleton, dof_limits=limits))
+    assert [finding.code for finding in lint_scene(scene_of(figure))] == []
+
+
 def test_person_who_appears_later_has_no_gap():
     rows = np.arange(FRAMES)
     rows[:20] = rows[50:] = -1

@@ -17,8 +17,9 @@ from viewer.rigs.posing.dof_text import beyond_text
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, dof_labels, joint_labels, shown_joints
 
 _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
-# No joint rotates by more than two turns, and limits of more than two turns in degrees mean none.
-_TURNS = 4.0 * np.pi, 720.0
+# Few joints rotate by more than two turns, and limits of more than two turns in degrees mean none.
+# Two turns in a file may be rounded up, as in 12.57.
+_TURNS = 12.6, 720.0
 
 
 def check(subject: Subject) -> Iterator[Finding]:
