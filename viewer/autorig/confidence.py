@@ -246,7 +246,7 @@ def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> t
         followed.append(float(np.mean(parts)))
     if not followed:
         return ()
-    # The middle of these: more of a leg is away from the bones than along them.
+    # Halfway between the limits, half of a leg is away from the bones.
     return (
         Finding(
             "R017.legs: bones follow only {value:.0%} of the legs",

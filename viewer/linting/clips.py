@@ -30,7 +30,7 @@ from viewer.rigs.skeleton import Skeleton, joint_labels
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
 _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
-# A body that steps aside in one frame, and rests before and after, does not move: falls accelerate.
+# A body that shifts in one frame, and rests before and after, has not moved: falls accelerate.
 _STEP = 0.04  # minimum length, relative to the size: 70 mm for a person
 _STILL, _BESIDE = 0.1, 4  # maximum length of steps beside it, relative to it, and their number
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
@@ -178,7 +178,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
 
 
 def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
-    """Report a body that is elsewhere from one frame on: it moves as little before as after."""
+    """Report a body that shifts within a frame and hardly moves before and after."""
     rows, carriers = track.on_frames(), travelling_joints(track, skeleton)
     places = track.positions[rows][:, carriers]
     steps = np.linalg.norm(np.diff(places, axis=0), axis=2)
@@ -195,7 +195,8 @@ def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     found = rows[frames + 1]
     first, each = int(found[worst]), track.of_each(found)
     yield subject.found(
-        "C003.step: {n}: {joint} is {distance} away from frame {frame} on, {time:z.3f} s",
+        "C003.step: {n}: {joint} shifts by {distance} at frame {frame}, {time:z.3f} s, at rest "
+        "before and after",
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,
         joint=joint_labels(skeleton)[int(carriers[joints[worst]])],

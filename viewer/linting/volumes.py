@@ -65,7 +65,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     if equal:
         vertices = np.concatenate([*equal.values()])
         yield subject.found(
-            "W017.equal: {n} half the weight of a joint and half of its parent, all along: {names}",
+            "W017.equal: {n} equal weights for a joint and its parent, without a "
+            "transition: {names}",
             n=counted(len(vertices), "vertex", "has", "have"),
             names=listed([labels[joint] for joint in equal]),
             vertices=vertices,
