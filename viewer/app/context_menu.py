@@ -14,7 +14,7 @@ from viewer.app.core.widgets import begin_menu, menu_item
 from viewer.app.palette import toggle_palette
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import copy_pose, paste_pose, reset_actor, reset_joint
-from viewer.app.rigging.joint_editing import mirror
+from viewer.app.rigging.joint_editing.commands import mirror
 from viewer.app.view.camera_panel import fit_actor, fit_selection
 from viewer.app.view.display_panel import draw_bone_styles, draw_views, toggle_option
 from viewer.app.view.hovering import Picking

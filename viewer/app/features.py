@@ -46,7 +46,7 @@ from viewer.app.retargeting.joint_match_panel import (
     ask_where_to_save,
     match_automatically,
 )
-from viewer.app.rigging.joint_editing import delete_joint, mirror
+from viewer.app.rigging.joint_editing.commands import delete_joint, mirror
 from viewer.app.rigging.results import switch_version
 from viewer.app.view.camera_panel import fit_selection, fit_view, look, toggle_projection
 from viewer.app.view.display_panel import (

@@ -19,7 +19,8 @@ from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.preferences import CAPTURED, Appearance, Preferences
 from viewer.app.preferences.preferences_window import close_preferences
 from viewer.app.recording.recording import RecordingState
-from viewer.app.rigging.joint_editing import cancel_joint_drag, stop_editing
+from viewer.app.rigging.joint_editing.drags import cancel_joint_drag
+from viewer.app.rigging.joint_editing.state import stop_editing
 from viewer.app.rigging.tools import drop_rig_tool
 from viewer.app.weights.weights_panel import Weights, unpin
 from viewer.data_classes import dataclass

@@ -45,7 +45,7 @@ from viewer.app.posing.posing import (
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.recording import open_record_dialog
-from viewer.app.rigging.joint_editing import mirror
+from viewer.app.rigging.joint_editing.commands import mirror
 from viewer.app.view.display_panel import draw_view_menu
 from viewer.formats import opened_text
 from viewer.phrases import printable

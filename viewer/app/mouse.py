@@ -7,7 +7,8 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import choose_joint, use_handles
 from viewer.app.posing.posing import Posing
-from viewer.app.rigging.joint_editing import JointEditing, hold_joint
+from viewer.app.rigging.joint_editing.drags import hold_joint
+from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.rigging import Rigging
 from viewer.app.rigging.tools import holds_mouse
 from viewer.app.view.axis_gizmo import holds_gizmo

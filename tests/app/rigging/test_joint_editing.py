@@ -13,7 +13,7 @@ import viewer
 from viewer.app.closing import unsaved_edits
 from viewer.app.core.view_frame import view_frame
 from viewer.app.posing.posing import save_export
-from viewer.app.rigging.joint_editing import JointEditing
+from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.rigging import Rigging
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
@@ -177,7 +177,7 @@ def test_newest_place_is_bound_where_binding_takes_long(drive, monkeypatch):
             report(1, 2)  # raises once the job is cancelled
         return transfer(template, *arguments)
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.transfer", waiting)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.binding.transfer", waiting)
     hand.move(seen(hand, *joints(hand)[0]))
     hand.press()
     for place in (1.0, 2.0, 3.0):
@@ -217,7 +217,7 @@ def test_other_joints_are_fitted_to_those_placed_by_hand(drive, monkeypatch):
         kept.update({name: places[name] for name in held})
         return {"root": FAR, "middle": FAR + np.array([0.5, 0.25, 0.0]), "end": FAR}
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.fit_again", fitted)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
     hand.click("Fit the other joints")
     hand.finish_job()
     assert set(kept) == {"root", "end"}
@@ -282,7 +282,7 @@ def test_cancelled_binding_and_drags_leave_the_figure(drive, monkeypatch):
             report(1, 2)  # raises once the job is cancelled
         return transfer(*arguments)
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.transfer", waiting)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.binding.transfer", waiting)
     hand.click(seen(hand, 2.0, 0.0, 1.0))
     hand.step(2)
     assert hand.state.job is not None

@@ -28,7 +28,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_for_files
-from viewer.app.rigging import joint_editing
+from viewer.app.rigging.joint_editing.section import draw_section
 from viewer.app.rigging.placing import (
     aligned_template,
     box_fit,
@@ -116,7 +116,7 @@ def draw(state: AppState) -> None:
     if why:
         imgui.text_wrapped(f"{capitalized(why)}.")
     if _section("Edit skeleton", "joints placed and moved by hand"):
-        joint_editing.draw_section(state)
+        draw_section(state)
     if rigging.template_key == SHAPE:
         with disabled(state, why):
             if _section("Shape", "a skeleton is found in the shape of the target"):
