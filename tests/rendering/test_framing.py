@@ -19,8 +19,10 @@ from viewer.rendering.framing import (
 from viewer.rendering.recorder import Follow, Recording
 from viewer.rigs.captures.points import PointClip, PointLayout
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import affine_matrices
+from viewer.rigs.morph_target import MorphTarget, with_morphs
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.scene import Actor, Scene, pose_actors, scene_points
+from viewer.rigs.scene import Actor, Scene, points_of_scenes, pose_actors, scene_points
 
 ASPECT = 16 / 9
 LAYOUT = PointLayout("two", ("left_knee", "nose"), np.zeros((0, 2)), np.array([1, 0]))
@@ -100,6 +102,34 @@ def test_following_camera_fits_the_motion_relative_to_its_target():
     np.testing.assert_allclose(points.min(axis=0), still.min(axis=0), atol=1e-12)
     np.testing.assert_allclose(points.max(axis=0), still.max(axis=0), atol=1e-12)
     assert box[1, 0] == pytest.approx(3.0 + 2.0)  # one second at 2 units per second
+
+
+def test_actors_at_several_times_are_posed_together():
+    early = moving_arm(turns=False)
+    raised = affine_matrices(np.eye(3), np.array([0.0, 5.0, 0.0]))
+    late = replace(early.copy(), offset=0.1, placement=raised)
+    times = [0.8, 0.2, 0.5]
+    scenes = [Scene([early.copy(), late.copy()]) for _ in times]
+    pose_actors([actor for scene in scenes for actor in scene.actors], np.repeat(times, 2))
+    rest = early.figure.mesh.positions
+    for time, points in zip(times, points_of_scenes(scenes), strict=True):
+        # Two units per second; the frame at 0.5 s is missing.
+        places = np.array([[2.0 * time, 0.0, 0.0], [2.0 * (time - 0.1), 5.0, 0.0]])
+        clouds = [rest + place for place in (places[1:] if time == 0.5 else places)]
+        np.testing.assert_allclose(points, np.concatenate(clouds), atol=1e-12)
+
+
+def test_each_actor_of_a_figure_keeps_its_shape():
+    figure, up = arm(3), np.array([0.0, 1.0, 0.0])
+    rest = figure.mesh.positions
+    figure = with_morphs(figure, [MorphTarget("lift", np.arange(len(rest)), rest + up)])
+    actors = [Actor(figure) for _ in range(3)]
+    for actor, weight in zip(actors, (0.5, 0.0, 0.5), strict=True):
+        actor.pose.shape_weights[:] = weight
+    points = scene_points(Scene(actors))
+    np.testing.assert_allclose(
+        points, np.concatenate([rest + up / 2, rest, rest + up / 2]), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("up", ["y", "z"])

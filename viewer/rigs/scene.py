@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
@@ -451,21 +452,25 @@ def scene_rate(actors: Iterable[Actor]) -> float:
     return DEFAULT_RATE if longest is None else longest.frame_rate
 
 
-def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
+def pose_actors(actors: Iterable[Actor], time: float | Floats, interpolate: bool = False) -> None:
     """Pose actors with clips at a time of the scene's clock: ``pose``, ``points``, ``is_present``.
 
-    ``interpolate`` crosses gaps of captures instead of marking actors as absent.
+    ``time``: one for all actors, or one for each. ``interpolate`` crosses gaps of captures instead
+    of marking actors as absent.
     """
     from viewer.rigs.motion.evaluation import set_poses
 
-    groups: dict[tuple[int, int], list[Actor]] = {}
-    for actor in actors:
-        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
-    for group in groups.values():
+    actors = list(actors)
+    offsets = np.array([actor.offset for actor in actors])
+    own_times = np.asarray(time, dtype=np.float64) - offsets
+    groups: dict[tuple[int, int], list[int]] = {}
+    for number, actor in enumerate(actors):
+        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(number)
+    for numbers in groups.values():
+        group, times = [actors[number] for number in numbers], own_times[numbers]
         clip, figure = group[0].clip, group[0].figure
         if clip is None or (figure.skeleton is None and clip.points is None):
             continue
-        times = np.array([time - actor.offset for actor in group])
         found = clip.sample(figure.skeleton, times, interpolate)
         rows, poses = list[int](), list[Pose]()
         for row, (actor, is_present) in enumerate(zip(group, found.present.tolist(), strict=True)):
@@ -477,9 +482,9 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
                 poses.append(actor.own_pose)
         if figure.skeleton is not None and poses:
             set_poses(found, np.array(rows), figure.skeleton, poses)
-        for actor in group:
+        for actor, own_time in zip(group, times.tolist(), strict=True):
             if actor.springs is not None and actor.is_present:
-                actor.springs.swing(actor, time - actor.offset)
+                actor.springs.swing(actor, own_time)
 
 
 def still_pose(actor: Actor) -> Pose:
@@ -511,7 +516,18 @@ def scene_points(scene: Scene, show: Shown = "skin") -> Floats:
 
     A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
     """
-    clouds = [actor_points(actor, show) for actor in scene.actors if actor.is_drawn]
+    return points_of_scenes([scene], show)[0]
+
+
+def points_of_scenes(scenes: Sequence[Scene], show: Shown = "skin") -> list[Floats]:
+    """Return the ``scene_points`` of scenes, such as one scene at many times, posed together."""
+    drawn = [[actor for actor in scene.actors if actor.is_drawn] for scene in scenes]
+    clouds = iter(_points_of_actors([actor for actors in drawn for actor in actors], show))
+    return [_without_outliers(list(itertools.islice(clouds, len(actors)))) for actors in drawn]
+
+
+def _without_outliers(clouds: Sequence[Floats]) -> Floats:
+    """Return all points of clouds (N, 3), or the origin, with distant outliers clamped."""
     clouds = [cloud for cloud in clouds if len(cloud)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
     if len(points) < 1.0 / _OUTLIER_FRACTION:
@@ -531,33 +547,63 @@ def scene_box(scene: Scene, show: Shown = "skin") -> Floats:
 
 def actor_points(actor: Actor, show: Shown = "skin") -> Floats:
     """Return the points (N, 3) of an actor's drawn parts, or of a part that the figure has."""
-    figure = actor.figure
-    parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
-    shows_mesh = show != "skeleton" or figure.skeleton is None
-    shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
-    if figure.skeleton is not None and actor.own_pose is not None and shows_skeleton:
-        shape = shaped_skeleton(figure, actor.own_pose.shape_weights)
-        joints = skeleton_points(shape, actor.own_pose)
-        parts.append(apply_transform(placement_matrix(actor.own_pose), joints))
-        # Joints that coincide have no size to frame.
-        shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
-    if figure.mesh is not None and shows_mesh:
-        points = (
-            figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.own_pose)
-        )
-        if actor.hidden_parts:
-            points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
-        parts.append(points)
-    return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))
+    return _points_of_actors([actor], show)[0]
 
 
-def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
-    """Return the posed vertices (V, 3) without normals, which would double the work."""
+def _points_of_actors(actors: Sequence[Actor], show: Shown) -> list[Floats]:
+    """Return the ``actor_points`` of each actor; those of one figure are deformed together."""
+    joints = [_joints_shown(actor, show) for actor in actors]
+    vertices = _vertices_shown(actors, joints, show)
+    clouds = list[Floats]()
+    for actor, places, positions in zip(actors, joints, vertices, strict=True):
+        parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
+        if places is not None and actor.own_pose is not None:
+            parts.append(apply_transform(placement_matrix(actor.own_pose), places))
+        if positions is not None and actor.hidden_parts:
+            mesh = actor.figure.require_mesh()
+            positions = positions[visible_vertices(mesh, actor.hidden_parts)]
+        parts += [] if positions is None else [positions]
+        clouds.append(apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))])))
+    return clouds
+
+
+def _joints_shown(actor: Actor, show: Shown) -> Floats | None:
+    """Return the points (N, 3) of an actor's skeleton before its placement, if it is shown."""
+    figure, pose = actor.figure, actor.own_pose
+    is_shown = show in ("skeleton", "both") or figure.mesh is None
+    if figure.skeleton is None or pose is None or not is_shown:
+        return None
+    return skeleton_points(shaped_skeleton(figure, pose.shape_weights), pose)
+
+
+def _vertices_shown(
+    actors: Sequence[Actor], joints: Sequence[Floats | None], show: Shown
+) -> list[Floats | None]:
+    """Return the vertices (V, 3) of each actor whose mesh is shown, without normals."""
     from viewer.rigs.skinning import deform, deform_frames
 
-    if pose is None or not figure.is_attached:
-        return deform(figure, pose)[0]
-    return deform_frames(figure, [pose])[0]
+    found = list[Floats | None]([None] * len(actors))
+    together: dict[tuple[int, bytes], list[int]] = {}  # poses of one figure and one shape
+    for number, (actor, places) in enumerate(zip(actors, joints, strict=True)):
+        figure, pose = actor.figure, actor.own_pose
+        shows_mesh = show != "skeleton" or figure.skeleton is None
+        # Joints that coincide have no size to frame.
+        shows_mesh |= places is not None and not np.ptp(places, axis=0).any()
+        if figure.mesh is None or not shows_mesh:
+            continue
+        if show == "binding":
+            found[number] = figure.mesh.positions
+        elif pose is None or not figure.is_attached:
+            found[number] = deform(figure, pose)[0]
+        else:
+            key = id(figure), pose.shape_weights.tobytes()
+            together.setdefault(key, []).append(number)
+    for numbers in together.values():
+        poses = [actors[number].pose for number in numbers]
+        posed = deform_frames(actors[numbers[0]].figure, poses)
+        for number, positions in zip(numbers, posed, strict=True):
+            found[number] = positions
+    return found
 
 
 def scene_unit(scene: Scene) -> str:

@@ -16,7 +16,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import bounding_box
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene, Shown, pose_actors, scene_points
+from viewer.rigs.scene import Actor, Scene, Shown, points_of_scenes, pose_actors
 
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
@@ -81,8 +81,9 @@ class _MotionExtent:
         left = self._left(scene, clock, grows)
         self.is_done = not left and not grows
         n_points = max(_n_points(scene), 1)
-        for time in left[: max(_POINTS_A_TIME // n_points, 1)]:
-            self._clouds[time] = self._cloud(scene, clock, time, show)
+        times = left[: max(_POINTS_A_TIME // n_points, 1)]
+        for time, cloud in zip(times, self._sampled(scene, clock, times, show), strict=True):
+            self._clouds[time] = cloud
             self._kept.pop(time, None)
         return bool(left)
 
@@ -112,8 +113,26 @@ class _MotionExtent:
         left = wanted - self._clouds.keys()
         return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
 
-    def _cloud(self, scene: Scene, clock: Clock, time: float, show: Shown) -> Floats:
-        """Return the outermost points at one time; none if all actors are absent."""
+    def _sampled(self, scene: Scene, clock: Clock, times: list[float], show: Shown) -> list[Floats]:
+        """Return the outermost points at some times; none where all actors are absent."""
+        scenes = [self._unposed(scene) for _ in times]
+        if clock.has_motion:
+            actors = [actor for seen in scenes for actor in seen.actors]
+            each = np.repeat(times, len(scene.actors))
+            pose_actors(actors, each, clock.interpolate_gaps)
+        clouds = points_of_scenes(scenes, show)
+        if not clock.has_motion:
+            return clouds  # one frame: keeping all points is faster than reducing them
+        low, high = _N_DIRECTIONS
+        return [
+            outermost(cloud, min(max(_MOST_PRODUCTS // len(cloud), low), high))
+            if any(actor.is_drawn for actor in seen.actors)
+            else cloud[:0]
+            for seen, cloud in zip(scenes, clouds, strict=True)
+        ]
+
+    def _unposed(self, scene: Scene) -> Scene:
+        """Return a copy of a scene in the poses in which it was opened, with its current shapes."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
             # Hair and clothes hardly change the size of a motion, but simulating them takes long.
@@ -122,15 +141,7 @@ class _MotionExtent:
                 weights = actor.own_pose.shape_weights
                 actor.pose = self._opened[id(shown)][2].copy()
                 actor.own_pose.shape_weights = weights
-        if clock.has_motion:
-            pose_actors(seen.actors, time, clock.interpolate_gaps)
-            if not any(actor.is_drawn for actor in seen.actors):
-                return np.zeros((0, 3))
-        points = scene_points(seen, show)
-        if not clock.has_motion:
-            return points  # one frame: keeping all points is faster than reducing them
-        low, high = _N_DIRECTIONS
-        return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
+        return seen
 
 
 @dataclass(slots=True)

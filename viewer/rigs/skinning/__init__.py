@@ -18,7 +18,7 @@ from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import unit
-from viewer.rigs.kinematics import posed_skeleton, skinning_matrices, world_matrices
+from viewer.rigs.kinematics import posed_skeleton, skinning_matrices
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.pose import Pose, placement_matrix, rest_pose
@@ -221,14 +221,16 @@ def deform_frames(
     how = skinning or Skinning()
     if not poses or not figure.is_attached or how.method != "lbs":
         raise RigError("expected poses, a figure with mesh, skeleton and skin, and method lbs")
+    from viewer.rigs.motion.instances import pose_arrays, worlds
     from viewer.rigs.skinning import lbs
 
     figure = shaped(figure, poses[0].shape_weights)
     mesh, skeleton, skin = figure.attached()
     used = skin_used(skin, how)
     frames = np.empty((len(poses), mesh.n_vertices, 3))
-    for frame, pose in zip(frames, poses, strict=True):
-        palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    all_worlds = worlds(skeleton, pose_arrays(poses))
+    for frame, pose, world in zip(frames, poses, all_worlds, strict=True):
+        palette = skinning_matrices(world, skin.inverse_bind)
         moved, _ = lbs.move(rest_positions(figure, mesh, pose, how.correctives), used, palette)
         np.multiply(moved, pose.figure_scale, out=frame)
         frame += pose.figure_translation
