@@ -14,6 +14,7 @@ from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.curve_skeleton import Chain, Tree, _Plane, find_skeleton, paired_chains
 from viewer.autorig.medial import Protrusion
+from viewer.autorig.parts import parts_of
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import solid_of
 from viewer.cli import run
@@ -259,6 +260,13 @@ def test_objects_that_only_touch_are_refused_with_the_place(monkeypatch):
     # The same parts, one in the other, are one object.
     lines = found(united(pointed, (other[0] - [0.5, 0, 0], other[1]))).lines
     assert "2 separate parts are rigged as one object" in [str(line) for line in lines]
+
+
+def test_thin_part_in_a_thick_one_is_joined_with_it():
+    thick = pipe([(0, -0.7, 0), (0, 0.7, 0)], 0.8, around=16)
+    mesh = mesh_of(*united(thick, pipe([(0.6, 0, 0), (2.6, 0, 0)], 0.15, around=16)))
+    parts = parts_of(mesh, solid_of(mesh.positions, mesh.triangles, 48))
+    assert parts.count == 2 and parts.contact is None and len(parts.shares) == 1
 
 
 HINGES = [1.4, 2.3]

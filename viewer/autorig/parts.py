@@ -82,6 +82,8 @@ def parts_of(mesh: Mesh, solid: Solid) -> Parts:
     owners = labels[cKDTree(places).query(solid.centers(solid.voxels))[1]]
     widest = np.zeros(len(samples))
     np.maximum.at(widest, owners, solid.radii())
+    # Inside several parts, as in a neck, the solid is wider than each of them.
+    widest = np.minimum(widest, [_half_thickness(own) for own in samples])
     each = areas.sum() / _SAMPLES  # area of a sample
     trees = [cKDTree(own) for own in samples]
     joined, touching = list[tuple[int, int]](), dict[tuple[int, int], Floats]()
@@ -120,6 +122,12 @@ def _overlaps(
         others = [k for k in range(len(samples)) if k != number]
         gaps = [float(cKDTree(samples[k]).query(inside)[0].mean()) for k in others]
         yield number, others[int(np.argmin(gaps))]
+
+
+def _half_thickness(points: Floats) -> float:
+    """Return half of the smallest extent of points (N, 3) along their principal axes."""
+    apart = points - points.mean(axis=0)
+    return 0.5 * float(np.ptp(apart @ np.linalg.eigh(apart.T @ apart)[1], axis=0).min())
 
 
 def _samples(positions: Floats, triangles: Ints, fraction: float) -> Floats:
