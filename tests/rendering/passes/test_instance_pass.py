@@ -488,9 +488,12 @@ def work(monkeypatch):
     return done
 
 
-def crowd(count: int) -> Scene:
+COARSE = {"sides": 8, "rings": 16}  # skinned in software by the hundred
+
+
+def crowd(count: int, **sides) -> Scene:
     """Return bent arms of one figure in rows."""
-    figure = arm(3)
+    figure = arm(3, **sides)
     actors = [bent(figure, (1, "z", 0.001 * number)) for number in range(count)]
     for number, actor in enumerate(actors):
         actor.placement[:3, 3] = 4.0 * (number % 32), 0.0, 4.0 * (number // 32)
@@ -506,7 +509,7 @@ def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, ch
     size, draws = (64, 48), {}
     options = DisplayOptions(**{"quality": "draft", **changes})
     for count in (10, 100):
-        scene = crowd(count)
+        scene = crowd(count, **COARSE)
         box, camera = scene_box(scene), default_camera(scene, size)
         for _ in range(3):  # the second image of a size stores its background
             work.clear()
@@ -518,7 +521,7 @@ def test_orbit_around_still_actors_skins_and_uploads_nothing(offscreen, work, ch
 
 
 def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
-    scene, size = crowd(100), (64, 48)
+    scene, size = crowd(100, **COARSE), (64, 48)
     camera, box = default_camera(scene, size), scene_box(scene)
 
     def draw(quality) -> dict[str, int]:
@@ -547,7 +550,7 @@ def test_frames_of_200_actors_call_no_more_functions_than_those_of_20(offscreen)
         done[event] += 1
 
     for number in (20, 200):
-        scene = crowd(number)
+        scene = crowd(number, **COARSE)
         camera, box = default_camera(scene, size), scene_box(scene)
         for angle in (0.0, 0.1, 0.1, 0.2):  # programs, caches and the background are made at first
             for actor in scene.actors:
