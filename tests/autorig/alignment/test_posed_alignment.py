@@ -136,7 +136,10 @@ def test_long_arms_and_wide_hips_that_were_found_are_kept(monkeypatch):
     marked, start, marks = start_of_landmarks(figure, pose, posed, known, still)
     # As estimates from the anatomy, they are not known to be exact.
     marks = replace(marks, kept=np.full(len(joints), FADED))
-    found = posed_alignment._fitted_marks(job, marked, start, marks)
+    percents = []
+    with receiving(lambda done, *_: percents.append(done)):
+        found = posed_alignment._fitted_marks(job, marked, start, marks)
+    assert percents == sorted(percents) and percents[-1] > 80
     places = found.alignment.similarity.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
     # 1.3 % apart if all that the surface does not show is as in the template again.
     size = np.ptp(target, axis=0).max()

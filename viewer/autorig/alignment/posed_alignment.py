@@ -300,7 +300,8 @@ def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> Pos
     """Fit a template with marks to the surface; ``start`` has them where they should be."""
     is_landmark = marks.kept == 1.0
     marks = replace(marks, weights=marks.weights * np.where(is_landmark, 1.0, _MARKED))
-    state = fit_pose(marked, start, job.cloud, job.exact, True, marks, _NEARBY)
+    with part_of_work(span=(0.0, 0.4)):
+        state = fit_pose(marked, start, job.cloud, job.exact, True, marks, _NEARBY)
     found = _unmarked(job, state)
     if misfit(found.alignment, False) > _POOR:
         return found
@@ -313,22 +314,12 @@ def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> Pos
     kept = marks.chosen(is_landmark)
     if kept is None:
         marked, state = job.template, _of_template(job, state)
-    fits = [
-        _unmarked(
-            job,
-            fit_pose(
-                marked,
-                state,
-                job.exact,
-                job.exact,
-                True,
-                kept,
-                _CLOSER,
-                replace(since, grown=part * state.grown),
-            ),
-        )
-        for part in (0.0, 0.5)
-    ]
+    fits = []
+    for number, fraction in enumerate((0.0, 0.5)):
+        estimate = replace(since, grown=fraction * state.grown)
+        with part_of_work(span=(0.4 + 0.3 * number, 0.7 + 0.3 * number)):
+            fit = fit_pose(marked, state, job.exact, job.exact, True, kept, _CLOSER, estimate)
+            fits.append(_unmarked(job, fit))
     return min(fits, key=lambda fit: misfit(fit.alignment, False))
 
 
