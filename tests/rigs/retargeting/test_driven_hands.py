@@ -12,14 +12,18 @@ from rigs.retargeting.two_people import places
 from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.evaluation import frames_of, world_frames
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
-from viewer.rigs.retargeting.driven_hands import keep_hands
+from viewer.rigs.retargeting.driven_hands import hand_notes, keep_hands
 from viewer.rigs.retargeting.retarget import retarget
 from viewer.rigs.skin import skin_from_lists
 
 ARM, ELBOW, HAND = ("LeftArm", "LeftForeArm", "LeftHand")
 # The height from ankles to neck: thigh 45, shin with the ankle 2 behind it, and pelvis to neck.
+REST = np.tile([0.0, 0.0, 0.0, 1.0], (len(NAMES), 1))
 HEIGHT = 45.0 + np.hypot(42.0, 2.0) + 50.0
 
 
@@ -135,6 +139,70 @@ def test_hands_stay_outside_of_a_stout_body(is_shaped):
     # The trunk, which has no skin here, attracts hands by 0.4 cm; without the skin of the thighs,
     # they would be 2.4 cm nearer.
     assert (after >= np.minimum(before, 22.0) - 0.5).all()
+
+
+def with_hands(figure, reach):
+    """Return a figure with soles at height 0, and fingers that end ``reach`` beyond the wrists."""
+    names = list(figure.skeleton.names)
+    points, rows = [], []
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        ball = places_at_rest(figure)[f"{side}ToeBase_"]
+        wrist = places_at_rest(figure)[f"{side}Hand_"]
+        for joint, tips in (
+            ("ToeBase", ball * [1.0, 0.0, 1.0] + [[-2.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0, 0, 3.0]]),
+            ("Hand", wrist + sign * np.array([[reach, 0, 0], [1.0, 1.0, 0], [1.0, 0, 1.0]])),
+        ):
+            points.append(tips)
+            rows += [[(names.index(f"{side}{joint}_"), 1.0)]] * 3
+    positions = np.concatenate(points)
+    bind = np.tile(np.eye(4), (len(names), 1, 1))
+    bind[:, :3, 3] = -np.array([places_at_rest(figure)[name] for name in names])
+    mesh = Mesh(positions, 0.0 * positions, np.arange(12, dtype=np.int32).reshape(-1, 3))
+    return replace(figure, mesh=mesh, skin=skin_from_lists(rows, bind))
+
+
+def places_at_rest(figure):
+    still = SampledClip("", Timing(30.0, np.zeros(1, dtype=np.int32)), REST[None])
+    return {name: points[0] for name, points in places(figure, still).items()}
+
+
+def lowest_fingers(figure, clip, reach):
+    """Return the lowest height (N,) of fingers above the lowest sole; arms hang, so they do too."""
+    times = np.arange(clip.n_rows) / clip.timing.frame_rate
+    worlds = world_frames(figure, frames_of(figure, clip, times))
+    names = figure.skeleton.names
+    tips, soles = [], []
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        hand = worlds[:, names.index(f"{side}Hand_")]
+        tips.append((hand @ [sign * reach, 0.0, 0.0, 1.0])[:, 1])
+        soles.append(worlds[:, names.index(f"{side}ToeBase_")][:, 1, 3] - 1.0)
+    return np.minimum(*tips) - np.minimum(*soles)
+
+
+def test_fingers_of_long_arms_stay_above_the_ground():
+    figure, source = with_hands(body(arms=3.0), 20.0), motion(0.3, 0.2, down=1.0)
+    found, clip, changes = kept(figure, source)
+    before, after = (lowest_fingers(figure, each, 20.0) for each in (found.clip, clip))
+    # From shoulders at 145 cm, 1 radian below the horizontal, hang 3 times 28 cm, and, bent by 0.1
+    # to 0.5 radians, 3 times 26 with fingers of 20.
+    bends = np.array([0.1, 0.5])
+    low = 145.0 - np.sin(1.0) * (3.0 * 28.0 + (3.0 * 26.0 + 20.0) * np.cos(bends))
+    assert_allclose((before.min(), before.max()), low, atol=0.1)  # -7.7, 2.0
+    assert_allclose(after, np.maximum(before, 0.0), atol=1e-6)
+    assert_allclose(changes.lifted, -before.min())
+    (text,) = map(str, hand_notes(changes, found, replace(figure, unit="cm")))
+    assert text.startswith("hands of other lifted by up to 77.3 mm") and "--hand-contact" in text
+
+
+def test_hands_that_sink_in_the_source_too_are_not_lifted():
+    # Both people have the same long arms.
+    long = body(arms=2.4)
+    source = motion(0.0, 0.0)
+    source = replace(source, figure=replace(long, name="long"))
+    figure = with_hands(long, 20.0)
+    found, clip, changes = kept(figure, source)
+    assert lowest_fingers(figure, found.clip, 20.0).min() < -1.0
+    assert changes is None and clip is found.clip
 
 
 def test_hands_can_be_left_as_retargeted_and_are_reported():

@@ -40,7 +40,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
         clip, changes = plant_feet(found, body, drive.hangs)
         notes = notes + feet_notes(changes, found, body)
     if drive.keeps_hands:
-        clip, kept = keep_hands(found, clip, body)
+        clip, kept = keep_hands(found, clip, body, drive.hangs)
         notes = notes + hand_notes(kept, found, body)
     if limbs is not None:
         clip = limbs.original_clip(clip, figure)

@@ -2,12 +2,13 @@
 
 Retargeting preserves the directions of limbs, so hands that rest on a hip, touch the head or clap
 miss if proportions differ. Near a part of the body, a wrist gets the place relative to that part
-that it has in the source, scaled by the height; elbow and shoulder follow.
+that it has in the source, scaled by the height; elbow and shoulder follow. Hands of long arms stay
+above the ground if those of the source do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,10 +22,13 @@ from viewer.rigs.cleanup.frames import in_frame_order
 from viewer.rigs.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds, shape_of
 from viewer.rigs.feet.curves import falling
 from viewer.rigs.feet.legs import Leg, leg_rotations
+from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.retargeting.retarget import Retargeted
+from viewer.rigs.scalars import length_text
 from viewer.rigs.shape import rest_joints, shaped
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.skin import owners, strongest_influences
@@ -40,6 +44,7 @@ _ARMS = tuple(
 )
 _TOPS = ("neck", "head")  # the upper end of the height, the first that is matched
 _LEG = ("left_hip", "left_knee", "left_ankle")
+_FEET = tuple(tuple(f"{side}_{part}" for part in ("foot", "ankle")) for side in ("right", "left"))
 
 # Distances of a wrist from the axis of a part, relative to the height from ankles to neck: up to
 # the first, it touches the part, beyond the second it is free. A person's wrist is 0.12 to 0.14
@@ -59,16 +64,24 @@ class KeptHands:
 
     before: float
     after: float
-    """Mean distances, relative to the height from ankles to neck, weighted by nearness."""
+    """Mean distances, relative to the height from ankles to neck, weighted by nearness; 0 if no
+    hand was moved to the body."""
+    lifted: float = 0.0
+    """Largest distance, in figure units, by which a hand was lifted to stay above the ground."""
 
 
 class _Body:
     """Joints of a body by meaning, in all rows of a motion, without its place and scale."""
 
     def __init__(
-        self, skeleton: Skeleton, clip: SampledClip, joints: dict[str, int], rests: Floats
+        self,
+        skeleton: Skeleton,
+        clip: SampledClip,
+        joints: dict[str, int],
+        rests: Floats,
+        others: Iterable[int] = (),
     ) -> None:
-        self.rests, self.chains = rests, chains_to(skeleton, joints.values())
+        self.rests, self.chains = rests, chains_to(skeleton, [*joints.values(), *others])
         self.place = {name: int(self.chains.place[joint]) for name, joint in joints.items()}
         self.rest = rest_worlds(skeleton, self.chains, rests)
         # A scale or place of the whole figure changes nothing between the parts of its body.
@@ -85,25 +98,23 @@ class _Body:
 
 
 def keep_hands(
-    found: Retargeted, clip: SampledClip, figure: Figure
+    found: Retargeted, clip: SampledClip, figure: Figure, hangs: bool = False
 ) -> tuple[SampledClip, KeptHands | None]:
-    """Return a clip of a driven figure with hands that touch its body; None if none were moved."""
+    """Return a clip of a driven figure with hands that touch its body; None if none were moved.
+
+    ``hangs``: whether the up axis of the motion points down.
+    """
     skeleton, source = figure.require_skeleton(), found.source.figure.require_skeleton()
-    partners = found.matches.partners.tolist()
-    needed = {"pelvis", *_LEG, *_ARMS[0], *_ARMS[1]}
-    wanted = needed.union(*_PARTS)
-    mine = {
-        name: joint
-        for joint, name in enumerate(found.matches.names)
-        if name in wanted and partners[joint] >= 0
-    }
-    if not needed <= mine.keys() or mine.keys().isdisjoint(_TOPS) or not clip.n_rows:
+    mine = _driven_joints(found)
+    if not mine or not clip.n_rows:
         return clip, None
     given, clip = clip, in_frame_order(clip)
     weights = shape_of(figure, clip)
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
-    body = _Body(skeleton, clip, mine, rests)
-    theirs = {name: partners[joint] for name, joint in mine.items()}
+    shape = shaped(figure, weights)
+    skin = _skin_of_ends(shape, mine)
+    body = _Body(skeleton, clip, mine, rests, () if skin is None else skin.movers)
+    theirs = {name: int(found.matches.partners[joint]) for name, joint in mine.items()}
     own_rests = np.stack([source.rest_translations, source.rest_scales])
     other = _Body(source, in_frame_order(found.source.clip), theirs, own_rests)
     is_free = (body.chains.place[[each.joint for each in skeleton.constraints]] < 0).all()
@@ -112,7 +123,7 @@ def keep_hands(
     )
     if not can_move:
         return given, None
-    radii = _radii(shaped(figure, weights), mine, body.height)
+    radii = _radii(shape, mine, body.height)
     shifts, nearness, together = _shifts(body, other, found.to_target, radii)
     before = _error(shifts, nearness)
     # The distances that are left to two hands add up.
@@ -121,8 +132,12 @@ def keep_hands(
         _within_reach(body, arm, _beyond_slack(shift, slack))
         for arm, shift in zip(_ARMS, shifts, strict=True)
     ]
-    if not any(shift.any() for shift in shifts):
+    touches = any(shift.any() for shift in shifts)
+    up = -axis_vector(figure.up) if hangs else axis_vector(figure.up)
+    lifts = _lifts(body, other, found, skin, up, shifts)
+    if not (touches or lifts.any()):
         return given, None
+    shifts = [shift + lift[:, None] * up for shift, lift in zip(shifts, lifts, strict=True)]
     joints = body.chains.joints
     arms = [Leg(*(body.place[name] for name in (*arm, arm[2]))) for arm in _ARMS]
     rotations = clip.rotations.copy()
@@ -133,25 +148,49 @@ def keep_hands(
     kept = replace(clip, rotations=rotations)
     reached = _Body(skeleton, kept, mine, rests)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    return kept, KeptHands(before, _error(wished, nearness))
+    misses = (before, _error(wished, nearness)) if touches else (0.0, 0.0)
+    return kept, KeptHands(*misses, body.height * float(lifts.max()))
 
 
 def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
     """Return a message about the change made by keeping hands at the body."""
     if kept is None:
         return []
-    return [
-        note(
-            "F007.hands-kept: hands of {figure} kept at its body where those of {motion} are at "
-            "the body: they miss by {after:.1f} % of the height from ankles to neck instead of "
-            "{before:.1f} %; {remedy} disables this",
-            figure=figure.name,
-            motion=found.source.figure.name,
-            after=100.0 * kept.after,
-            before=100.0 * kept.before,
-            remedy=Remedy("Hands at the body in the Actors panel", "--hand-contact off"),
+    notes: list[Diagnostic] = []
+    called = {"motion": found.source.figure.name, "figure": figure.name}
+    remedy = Remedy("Hands at the body in the Actors panel", "--hand-contact off")
+    if kept.before:
+        notes.append(
+            note(
+                "F007.hands-kept: hands of {figure} kept at its body where those of {motion} are "
+                "at the body: they miss by {after:.1f} % of the height from ankles to neck instead "
+                "of {before:.1f} %; {remedy} disables this",
+                **called,
+                after=100.0 * kept.after,
+                before=100.0 * kept.before,
+                remedy=remedy,
+            )
         )
-    ]
+    if kept.lifted:
+        notes.append(
+            note(
+                "F007.hands-lifted: hands of {figure} lifted by up to {length}, so that they do "
+                "not sink below its feet, as those of {motion} do not; {remedy} disables this",
+                **called,
+                length=length_text(figure, kept.lifted),
+                remedy=remedy,
+            )
+        )
+    return notes
+
+
+def _driven_joints(found: Retargeted) -> dict[str, int]:
+    """Return the driven joints of a figure by meaning; empty if one that is needed is missing."""
+    needed = {"pelvis", *_LEG, *_ARMS[0], *_ARMS[1]}
+    wanted = needed.union(*_PARTS, *_FEET)
+    names, is_driven = found.matches.names, found.matches.partners >= 0
+    mine = {name: j for j, name in enumerate(names) if name in wanted and is_driven[j]}
+    return {} if not needed <= mine.keys() or mine.keys().isdisjoint(_TOPS) else mine
 
 
 def _shifts(
@@ -214,6 +253,43 @@ def _within_reach(body: _Body, arm: tuple[str, ...], shift: Floats) -> Floats:
     distance = np.maximum(np.linalg.norm(away, axis=1), 1e-30)
     is_far = (distance > most)[:, None]
     return np.where(is_far, shoulder + away * (most / distance)[:, None] - wrist, shift)
+
+
+def _skin_of_ends(figure: Figure, joints: dict[str, int]) -> Soles | None:
+    """Return the skin of the hands, as of ``_ARMS``, and of the feet; None if any has none."""
+    feet = [[joints[name] for name in foot if name in joints] for foot in _FEET]
+    if figure.mesh is None or figure.skin is None or not figure.is_attached or not all(feet):
+        return None
+    skin = soles_of_feet(figure, [*([joints[arm[2]]] for arm in _ARMS), *feet], is_bound=True)
+    return None if skin.above.any() else skin
+
+
+def _lifts(
+    body: _Body,
+    other: _Body,
+    found: Retargeted,
+    skin: Soles | None,
+    up: Floats,
+    shifts: list[Floats],
+) -> Floats:
+    """Return how far moved hands should rise, relative to the height: (2, N)."""
+    if skin is None:
+        return np.zeros((len(_ARMS), len(body.world)))
+    # Below the feet is the ground, or air that the source's hands do not enter either. These have
+    # no skin: they are taken to reach as far below their wrists as the figure's, so that squatting
+    # and handstands, in which the source's would sink too, are left alone.
+    skin = replace(skin, movers=body.chains.place[skin.movers])
+    heights = skin.heights(body.world, np.append(up, 0.0), 1.0) / body.height
+    ground = heights[:, len(_ARMS) :].min(axis=1)
+    scale = found.scale * other.height / body.height
+    feet = [name for foot in _FEET for name in foot if name in other.place]
+    level = np.min([other.at(name) @ found.to_target.T @ up for name in feet], axis=0)
+    lifts = []
+    for arm, shift, low in zip(_ARMS, shifts, heights.T, strict=False):
+        length = body.at(arm[2]) @ up - low
+        theirs = scale * (other.at(arm[2]) @ found.to_target.T @ up - level) - length
+        lifts.append(np.maximum(ground + np.minimum(theirs, 0.0) - low - shift @ up, 0.0))
+    return np.stack(lifts)
 
 
 def _error(shifts: list[Floats], nearness: list[Floats]) -> float:

@@ -37,6 +37,7 @@ _FAMILIES = {
     "SOMA": ("shoulder arm forearm hand -", "leg shin foot toebase"),
     "Rigify, Daz Genesis 9": ("shoulder upperarm forearm hand -", "thigh shin foot toe/toes"),
     "VRM, Unity": ("shoulder upperarm lowerarm hand -", "upperleg lowerleg foot toe/toes/toebase"),
+    "Quaternius": ("shoulder upperarm lowerarm fist -", "upperleg lowerleg foot -"),
     "Xsens": ("shoulder upperarm forearm hand -", "upperleg lowerleg foot toe"),
     "Unreal": ("clavicle upperarm lowerarm hand -", "thigh calf foot ball/toe"),
     "3ds Max Biped, Character Creator": (
