@@ -14,7 +14,7 @@ def names(hand):
 
 def seen(hand, row):
     actor = hand.state.scene.actors[row]
-    return apply_transform(actor.placement, deform(actor.figure, actor.pose)[0])
+    return apply_transform(actor.placement, deform(actor.figure, actor.own_pose)[0])
 
 
 def stop(hand):
