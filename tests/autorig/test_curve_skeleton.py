@@ -179,9 +179,15 @@ def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long
     legs = [box((x - 0.1, y, z - 0.1), (x + 0.1, 1.1, z + 0.1)) for x, y, z in feet]
     chair = found(united(seat, back, *legs))
     joints = joints_of(chair.figure.skeleton)
+    ends = [place for name, place in joints.items() if name.endswith("_end")]
     for foot in feet:
-        assert min(np.linalg.norm(place - foot) for place in joints.values()) < 0.35
-    assert joints["root"][1] > 1.0
+        assert min(np.linalg.norm(end - foot) for end in ends) < 0.3
+    assert len(ends) == 4 and joints["root"][1] > 1.0
+    # The root is between the sides, and not at a corner of the seat.
+    assert_allclose(joints["root"][[0, 2]], [0.0, 0.0], atol=0.5)
+    assert abs(joints["root"][0]) < 0.05
+    names = {f"leg_{number}_{side}_end" for number in (1, 2) for side in ("left", "right")}
+    assert names <= {*joints}
     assert not [line for line in chair.lines if "loop" in str(line)]
 
 

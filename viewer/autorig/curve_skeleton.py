@@ -42,7 +42,7 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed, rounded
 from viewer.progress import part_of_work, report_fraction
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import ball_skeleton
@@ -56,6 +56,9 @@ _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of t
 # fraction of the solid there for which sheets are reported.
 _FAR, _MISSED = 2.0, 0.1
 _MOST_LOOPS = 20  # loops that are cut: each takes a search
+# Least radius, relative to the largest one, of the place where the search for the trunk begins: the
+# deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
+_DEEP = 0.75
 _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
 
 # Limbs.
@@ -334,9 +337,9 @@ def _smooth(points: Floats, rounds: int) -> Floats:
 def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     """Return the hubs and chains of a solid outwards from its trunk."""
     centers = solid.centers(solid.voxels)
-    deepest = np.flatnonzero(paths.radii >= paths.radii.max() - 1e-9)
+    deep = np.flatnonzero(_is_deep(solid))
     middle = centers.mean(axis=0)
-    source = int(deepest[np.linalg.norm(centers[deepest] - middle, axis=1).argmin()])
+    source = int(deep[np.linalg.norm(centers[deep] - middle, axis=1).argmin()])
     report_fraction(0.1)
     tree = tree_of(solid, paths, source)
     report_fraction(0.4)
@@ -346,6 +349,15 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     # Loops stay cut.
     again = tree_of(solid, paths, root)
     return replace(again, cuts=np.concatenate([tree.cuts, again.cuts]))
+
+
+def _is_deep(solid: Solid) -> Bools:
+    """Return which voxels (N,) have none around them that is deeper, and are deep themselves."""
+    from scipy.ndimage import maximum_filter
+
+    radii, around = solid.radii(), maximum_filter(solid.distance, 3)[tuple(solid.voxels.T)]
+    found: Bools = (radii >= around) & (radii >= _DEEP * radii.max())
+    return found
 
 
 def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
