@@ -11,6 +11,7 @@ from app.curves.plotted import clip_text
 from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.tiny import write_rig
+from autorig.moving_shapes import two_boxes, write_frames
 from autorig.rigged_shapes import turn
 from autorig.test_binding import box, joined
 from imgui_bundle import imgui
@@ -388,3 +389,32 @@ def test_frames_of_a_moving_mesh_become_bones(rigging, tmp_path):
     dialog.done(hand.state, [paths[0], tmp_path / "skin.png"])
     hand.finish_job()
     assert "skin.png: expected frames of one mesh, .obj or .ply" in hand.state.error
+
+
+def test_archives_of_a_moving_mesh_become_bones(rigging, tmp_path):
+    positions, faces = two_boxes()
+    whole, apart = tmp_path / "whole.npz", tmp_path / "apart.npy"
+    np.savez(whole, vertices=positions, faces=faces)
+    np.save(apart, positions)
+    (mesh,) = write_frames(tmp_path, "box", positions[:1], faces)
+    hand = rigging()
+    hand.click("Add mesh…")
+    hand.step(2)
+    dialog = hand.state.of(Files).dialog
+    assert {".npz", ".npy", ".obj"} <= {*dialog.suffixes}
+    hand.state.of(Files).dialog = None
+    hand.state.of(Rigging).choices.bones = 2
+    for paths, name in (([whole], "whole"), ([mesh, apart], "box_1")):
+        dialog.done(hand.state, paths)
+        hand.finish_job()
+        actor = hand.state.scene.actors[-1]
+        assert actor.name == name and actor.figure.skeleton.n_joints in (2, 3)
+        hand.state.clock.playing = False
+        hand.state.clock.seek(2 / actor.clip.frame_rate)
+        hand.step(2)
+        assert_allclose(deform(actor.figure, actor.pose)[0], positions[2], atol=1e-4)
+    still = tmp_path / "still.npz"
+    np.savez(still, vertices=positions[0])
+    dialog.done(hand.state, [still])
+    hand.finish_job()
+    assert "still.npz" in hand.state.error and hand.state.scene.actors[-1] is actor

@@ -73,6 +73,7 @@ from viewer.autorig.alignment.surface_alignment import AlignedBy, Alignment, Ali
 from viewer.autorig.settings import METHODS, TransferMethod
 from viewer.errors import ViewerError
 from viewer.formats import MESHES
+from viewer.loading.mesh_sequence import ARCHIVES
 from viewer.loading.placing import placed_like
 from viewer.phrases import capitalized, printable
 from viewer.rigs.arrays import Floats
@@ -158,8 +159,9 @@ def _draw_sources(state: AppState) -> None:
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
     if button(state, "Add mesh…", why):
-        title = f"Add a mesh to rig, or all frames of one that moves: {', '.join(MESHES)}"
-        ask_for_files(state, start_adding, title, MESHES, more=_draw_motion, more_rows=3.0)
+        suffixes = (*MESHES, *ARCHIVES)
+        title = f"Add a mesh to rig, or all frames of one that moves: {', '.join(suffixes)}"
+        ask_for_files(state, start_adding, title, suffixes, more=_draw_motion, more_rows=3.0)
     explain("add a mesh without a rig to this scene, or find bones in the frames of a moving one")
     with disabled(state, why):
         key = choice(state, "Template", view.template_key, template_texts(state))
@@ -199,7 +201,7 @@ def _draw_sources(state: AppState) -> None:
 
 
 def _draw_motion(state: AppState, _dialog: FileDialog) -> None:
-    """Draw the settings of bones that are found in the motion of several files."""
+    """Draw the settings of bones that are found in the frames of a moving mesh."""
     choices = state.of(Rigging).choices
     text = "number of bones for the frames of a moving mesh; 0 for as many as the tolerance needs"
     draw_setting(state, "Bones", choices, "bones", text)

@@ -54,7 +54,7 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.loading import load
-from viewer.loading.mesh_sequence import SEQUENCES, read_mesh_sequence
+from viewer.loading.mesh_sequence import ARCHIVES, SEQUENCES, read_mesh_sequence, stores_frames
 from viewer.loading.placing import placed_like
 from viewer.phrases import counted, one_of, printable
 from viewer.progress import part_of_work, report
@@ -115,37 +115,38 @@ def finish_work(state: AppState) -> None:
 
 
 def start_adding(state: AppState, paths: Sequence[Path]) -> None:
-    """Read a mesh to rig, and add it to the scene; find bones in the motion of several files."""
-    if len(paths) > 1:
-        _start_finding_bones(state, paths)
-        return
+    """Read a mesh to rig, and add it to the scene; find bones in the frames of a moving one."""
     path = paths[0]
+    if len(paths) > 1 or path.suffix.lower() in ARCHIVES:
+        _start_finding_bones(state, paths)
+    else:
+        begin_work(state, f"Reading {printable(path.name, 60)}", lambda: _mesh_to_rig(path))
 
-    def act() -> _Finish:
-        report(0, 0, "", f"Reading {printable(path.name, 60)}")
-        scene = load(path)
-        found = [actor for actor in scene.actors if actor.figure.mesh is not None]
-        if len(found) != 1:
-            count = len(found) or "none"
-            raise RigError(f"{printable(path)}: expected one mesh to rig, found {count}")
-        actor = found[0]
-        if actor.figure.is_rigged:
-            raise RigError(f"{printable(path)}: expected a mesh without a rig, found a rigged mesh")
 
-        def finish(state: AppState) -> None:
-            actor.called = free_title(state.scene.actors, actor.title)
-            notes = placed_like(state.scene, actor)
-            state.scene.actors.append(actor)
-            state.paths = (*state.paths, path)
-            state.of(Rigging).target = None  # makes the panel choose again
-            state.say(*scene.diagnostics, *notes)
-            choose_target(state, actor)
-            state.choose_actor(len(state.scene.actors) - 1)
-            state.framing.restart()
+def _mesh_to_rig(path: Path) -> _Finish:
+    """Read a mesh, and return a function that adds it to the scene."""
+    report(0, 0, "", f"Reading {printable(path.name, 60)}")
+    scene = load(path)
+    found = [actor for actor in scene.actors if actor.figure.mesh is not None]
+    if len(found) != 1:
+        count = len(found) or "none"
+        raise RigError(f"{printable(path)}: expected one mesh to rig, found {count}")
+    actor = found[0]
+    if actor.figure.is_rigged:
+        raise RigError(f"{printable(path)}: expected a mesh without a rig, found a rigged mesh")
 
-        return finish
+    def finish(state: AppState) -> None:
+        actor.called = free_title(state.scene.actors, actor.title)
+        notes = placed_like(state.scene, actor)
+        state.scene.actors.append(actor)
+        state.paths = (*state.paths, path)
+        state.of(Rigging).target = None  # makes the panel choose again
+        state.say(*scene.diagnostics, *notes)
+        choose_target(state, actor)
+        state.choose_actor(len(state.scene.actors) - 1)
+        state.framing.restart()
 
-    begin_work(state, f"Reading {printable(path.name, 60)}", act)
+    return finish
 
 
 def _start_finding_bones(state: AppState, paths: Sequence[Path]) -> None:
@@ -155,10 +156,13 @@ def _start_finding_bones(state: AppState, paths: Sequence[Path]) -> None:
     how = DecompositionSettings(choices.bones, choices.tolerance, most)
 
     def act() -> _Finish:
-        for path in paths:
-            if path.suffix.lower() not in SEQUENCES:
-                kinds = one_of(SEQUENCES)
-                raise RigError(f"{printable(path)}: expected frames of one mesh, {kinds}")
+        if not stores_frames(paths):
+            if len(paths) == 1:
+                return _mesh_to_rig(paths[0])
+            for path in paths:
+                if path.suffix.lower() not in SEQUENCES:
+                    kinds = one_of(SEQUENCES)
+                    raise RigError(f"{printable(path)}: expected frames of one mesh, {kinds}")
         with part_of_work("Reading", (0.0, 0.2)):
             moving, notes = read_mesh_sequence(paths)
         with part_of_work("Finding bones", (0.2, 0.9)):
@@ -180,7 +184,9 @@ def _start_finding_bones(state: AppState, paths: Sequence[Path]) -> None:
 
         return finish
 
-    begin_work(state, f"Finding bones in {counted(len(paths), 'frame')}", act, "bones")
+    archives = [path for path in paths if path.suffix.lower() in ARCHIVES]
+    where = printable(archives[0].name, 60) if archives else counted(len(paths), "frame")
+    begin_work(state, f"Finding bones in {where}", act, "bones")
 
 
 def start_reading(state: AppState, paths: Sequence[Path] = (), then: _Finish | None = None) -> None:
