@@ -12,14 +12,9 @@ from viewer.linting._subject import Subject, Track, track_of, world_turns
 from viewer.phrases import counted
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
-from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
 from viewer.rigs.skeleton import Skeleton, joint_labels
 
-_HINGES = [
-    [f"{side}_{joint}" for joint in limb]
-    for side in ("left", "right")
-    for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
-]
 # A hinge bends about one axis, which the motion itself shows: the limb's upper part x lower part,
 # in the space of the upper part, points to the same side whenever the limb is bent.
 _USUAL = math.radians(10.0)  # bend that most of the motion's larger bends exceed
@@ -35,7 +30,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     if track is None or skeleton is None:
         return
     names = joint_meanings(skeleton)
-    for limb in _HINGES:
+    for limb in LIMBS:
         if all(name in names for name in limb):
             upper, hinge, lower = (names.index(name) for name in limb)
             yield from _hinge(subject, track, skeleton, upper, hinge, lower)

@@ -192,14 +192,20 @@ def test_newest_place_is_bound_where_binding_takes_long(drive, monkeypatch):
     assert figure(hand) not in hand.state.of(JointEditing).stale
 
 
+def half_bar(*names):
+    """Return a bound bar of half the size, above the other, with a chain of joints from -2 to 2."""
+    above = FAR + np.array([0.0, 3.0, 0.0])
+    places = np.tile(above, (len(names), 1))
+    places[:, 0] += np.linspace(-2.0, 2.0, len(names))
+    skeleton = ball_skeleton(names, np.arange(-1, len(names) - 1, dtype=np.int32), places)
+    mesh = joined(box(above - 0.5 * HALF, above + 0.5 * HALF, (16, 2, 2)))
+    return transfer(Figure("t", None, skeleton), rest_pose(skeleton), mesh, BY_HEAT).figure
+
+
 @pytest.mark.usefixtures("quick_fits")
 def test_other_joints_are_fitted_to_those_placed_by_hand(drive, monkeypatch):
-    """The template is a bar of half the size with joints at -2, 0 and 2: all scale with two."""
-    above = FAR + np.array([0.0, 3.0, 0.0])
-    places = above + np.array([[-2.0, 0, 0], [0, 0, 0], [2, 0, 0]])
-    skeleton = ball_skeleton(("root", "middle", "end"), np.array([-1, 0, 1], np.int32), places)
-    mesh = joined(box(above - 0.5 * HALF, above + 0.5 * HALF, (16, 2, 2)))
-    template = transfer(Figure("t", None, skeleton), rest_pose(skeleton), mesh, BY_HEAT).figure
+    """The template's joints are at -2, 0 and 2: all scale with two."""
+    template = half_bar("root", "middle", "end")
     hand = opened(drive, bar(), template, start="template", fits=False, facing="z")
     assert names(hand) == ("root", "middle", "end")
     assert hand.state.of(JointEditing).fit is not None
@@ -226,6 +232,27 @@ def test_other_joints_are_fitted_to_those_placed_by_hand(drive, monkeypatch):
     assert hand.undo_steps == steps + 1
     undo(hand)
     assert hand.says("Undone: fit the other joints")
+
+
+@pytest.mark.usefixtures("quick_fits")
+def test_fit_bends_an_arm_where_it_bent_and_moves_the_hand_along(drive, monkeypatch):
+    """An arm from -4 over -4/3 to 4/3: its upper part is half of it, and stays so."""
+    arm = ("left_shoulder", "left_elbow", "left_wrist", "left_index1")
+    hand = opened(drive, bar(), half_bar(*arm), start="template", fits=False, facing="z")
+    hand.state.of(JointEditing).choices.weights = "keep"
+    pull(hand, joints(hand)[2], (2.0, 0.2, 0.0), held="ctrl")
+
+    def fitted(*_):
+        places = [[-3.6, 0, 0], [1, 0.4, 0], [1.5, 0.1, 0], [3.5, -0.1, 0.1]]  # misses the wrist
+        return dict(zip(arm, np.array(places) + FAR, strict=True))
+
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
+    hand.click("Fit the other joints")
+    hand.finish_job()
+    shoulder, elbow, wrist, finger = joints(hand)
+    assert_allclose([shoulder, wrist], [[-3.6, 0, 0], [2, 0.2, 0]], atol=2 * ATOL)
+    assert_allclose(elbow, 0.5 * (shoulder + wrist), atol=2e-3)
+    assert_allclose(finger - wrist, [2, -0.2, 0.1], atol=1e-9)
 
 
 def test_symmetric_edits_mirroring_and_removal(drive):

@@ -116,6 +116,12 @@ _SHARED = 0.6  # fraction of the joints above which a shared first or last word 
 _MOST = 2000  # maximum number of joints of a body
 _SPINES = ("spine1", "spine2", "spine3")
 
+LIMBS = tuple(
+    (f"{side}_{upper}", f"{side}_{middle}", f"{side}_{end}")
+    for side in ("left", "right")
+    for upper, middle, end in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+)
+"""Names in the SMPL family of the three joints of each arm and leg."""
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
 
 _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")

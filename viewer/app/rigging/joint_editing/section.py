@@ -28,7 +28,7 @@ from viewer.app.rigging.joint_editing.state import (
     no_joint,
     stop_editing,
 )
-from viewer.app.rigging.joint_editing.template_fit import fitted_template, no_refit, refit
+from viewer.app.rigging.joint_editing.template_fit import no_refit, refit, template_fit
 from viewer.phrases import capitalized, counted, printable
 from viewer.rigs.joint_edits import no_edit
 from viewer.rigs.scene import Actor
@@ -58,7 +58,7 @@ def draw_section(state: AppState) -> None:
     text = "edits apply to both sides; joints in the middle stay in the plane of symmetry"
     draw_setting(state, "Symmetric", editing.choices, "symmetric", text)
     _draw_joint(state, actor)
-    if fitted_template(state) is not None:
+    if template_fit(state) is not None:
         if button(state, "Fit the other joints", no_refit(state)):
             refit(state)
         explain("fit the template again; the joints that were moved by hand stay", no_refit(state))

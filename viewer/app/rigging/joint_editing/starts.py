@@ -15,7 +15,7 @@ from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import Posing
 from viewer.app.rigging.joint_editing.binding import weight_settings
 from viewer.app.rigging.joint_editing.rest_meshes import plane_of, rest_mesh
-from viewer.app.rigging.joint_editing.state import NOT_KEPT, JointEditing, show
+from viewer.app.rigging.joint_editing.state import NOT_KEPT, JointEditing, TemplateFit, show
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Rigging, Template, choose_target, target_mesh, targets
 from viewer.app.rigging.work import aligned_start, begin_work
@@ -209,7 +209,7 @@ def _enter(state: AppState, actor: Actor, begun: _Begun) -> None:
     if begun.place is not None:
         actor.placement, actor.own_pose = begun.place, None
     if begun.template is not None:
-        editing.fit = actor, begun.template
+        editing.fit = TemplateFit(actor, begun.template, figure)
     show(actor, figure)
     if row != state.chosen_actor:
         state.choose_actor(row)

@@ -60,6 +60,17 @@ class JointDrag:
     """Whether it was cancelled and only waits for the release of the button."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TemplateFit:
+    """A template that was fitted to the mesh of an actor."""
+
+    actor: Actor
+    template: Template
+    """As it was before."""
+    figure: Figure
+    """The figure that the actor got."""
+
+
 @dataclass(slots=True)
 class JointEditing:
     """State of the section "Edit skeleton" of the Rig panel."""
@@ -84,8 +95,8 @@ class JointEditing:
     """The reason why."""
     name: tuple[object, str] = (None, "")
     """Name that is being typed, and the joint that gets it."""
-    fit: tuple[Actor, Template] | None = None
-    """The last actor that got a fitted template, and the template as it was before."""
+    fit: TemplateFit | None = None
+    """The last fit of a template."""
     placed: WeakKeyDictionary[Skeleton, frozenset[str]] = field(default_factory=WeakKeyDictionary)
     """Names of the joints that were placed by hand, which another fit of the template keeps."""
 

@@ -2,65 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
 
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.rigging.joint_editing.rest_meshes import rest_mesh
-from viewer.app.rigging.joint_editing.state import JointEditing, commit, edited
-from viewer.app.rigging.rigging import Template
+from viewer.app.rigging.joint_editing.state import JointEditing, TemplateFit, commit, edited
 from viewer.app.rigging.work import begin_work, fit_again
 from viewer.rigs.arrays import Floats
+from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.quaternion import between
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.joint_edits import moved, rest_worlds
+from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
+from viewer.rigs.skeleton import Skeleton
 
 
-def fitted_template(state: AppState) -> Template | None:
-    """Return the template that was fitted to the edited mesh, None if there is none."""
+def template_fit(state: AppState) -> TemplateFit | None:
+    """Return the fit of a template to the edited mesh, None if there is none."""
     fit = state.of(JointEditing).fit
-    return fit[1] if fit is not None and fit[0] is edited(state) else None
+    return fit if fit is not None and fit.actor is edited(state) else None
 
 
 def no_refit(state: AppState) -> str:
     """Return the reason why the template cannot be fitted to joints placed by hand."""
-    template, actor = fitted_template(state), edited(state)
-    if template is None or actor is None:
+    fit, actor = template_fit(state), edited(state)
+    if fit is None or actor is None:
         return 'start from "template, fitted"'
     skeleton = actor.figure.require_skeleton()
     placed = state.of(JointEditing).placed.get(skeleton, frozenset())
-    if not placed & frozenset(template.figure.require_skeleton().names):
+    if not placed & frozenset(fit.template.figure.require_skeleton().names):
         return "move a joint first"
     return no_job_room(state)
 
 
 def refit(state: AppState) -> None:
     """Fit the template again, with the joints where they were placed by hand, as one step."""
-    template, actor, why = fitted_template(state), edited(state), no_refit(state)
-    if why or template is None or actor is None:
+    fit, actor, why = template_fit(state), edited(state), no_refit(state)
+    if why or fit is None or actor is None:
         state.say_status(f"Edit skeleton: {why}")
         return
     figure, skeleton = actor.figure, actor.figure.require_skeleton()
-    known = frozenset(template.figure.require_skeleton().names)
+    known = frozenset(fit.template.figure.require_skeleton().names)
     placed = state.of(JointEditing).placed[skeleton] & known
-    places = dict(zip(skeleton.names, rest_worlds(figure)[:, :3, 3], strict=True))
+    places, first = _places(figure), _places(fit.figure)
     mesh = rest_mesh(figure)
 
     def act() -> Callable[[AppState], None]:
-        found = fit_again(template, mesh, places, placed)
+        found = fit_again(fit.template, mesh, places, placed)
 
         def finish(state: AppState) -> None:
             if edited(state) is not actor or actor.figure.skeleton is not skeleton:
                 state.say("Not fitted: the joints were edited meanwhile")
                 return
-            new = dict[int, Floats]()
-            for joint, (name, above) in enumerate(
-                zip(skeleton.names, skeleton.parents.tolist(), strict=True)
-            ):
-                place = places[name]
-                # Joints that the template does not have move with those above them.
-                along = new[above] - places[skeleton.names[above]] if above >= 0 else 0.0
-                new[joint] = place if name in placed else found.get(name, place + along)
-            commit(state, moved(figure, new), "fit the other joints")
+            new = _followed(skeleton, places, found, placed)
+            new = _with_limbs(skeleton, new, first, found, placed)
+            commit(state, moved(figure, dict(enumerate(new))), "fit the other joints")
 
         return finish
 
     begin_work(state, "Fitting the template", act, target=actor)
+
+
+def _places(figure: Figure) -> dict[str, Floats]:
+    """Return the places (3,) of the joints at rest by name, in figure space."""
+    names = figure.require_skeleton().names
+    return dict(zip(names, rest_worlds(figure)[:, :3, 3], strict=True))
+
+
+def _followed(
+    skeleton: Skeleton,
+    places: Mapping[str, Floats],
+    found: Mapping[str, Floats],
+    placed: Collection[str],
+) -> Floats:
+    """Return the places (J, 3) of the joints: as placed by hand, or else as found."""
+    new = np.zeros((skeleton.n_joints, 3))
+    for joint, name in enumerate(skeleton.names):
+        above, place = int(skeleton.parents[joint]), places[name]
+        # Joints that the template does not have move with those above them.
+        along = new[above] - places[skeleton.names[above]] if above >= 0 else 0.0
+        new[joint] = place if name in placed else found.get(name, place + along)
+    return new
+
+
+def _with_limbs(
+    skeleton: Skeleton,
+    new: Floats,
+    first: Mapping[str, Floats],
+    found: Mapping[str, Floats],
+    placed: Collection[str],
+) -> Floats:
+    """Return the places (J, 3) with arms and legs whose ends were placed bent as at ``first``."""
+    names, meanings, new = skeleton.names, joint_meanings(skeleton), new.copy()
+    for limb in LIMBS:
+        joints = [meanings.index(joint) for joint in limb if joint in meanings]
+        if len(joints) < len(limb) or not {names[one] for one in joints} <= first.keys():
+            continue
+        upper, middle, end = joints
+        if names[end] not in placed:
+            continue
+        if names[middle] not in placed:
+            # The fit reaches a wrist by rotating the whole arm, which says little about the elbow.
+            before = [first[names[one]] for one in joints]
+            new[middle] = _bent(before, new[upper], new[end])
+        # The fit comes close to a landmark only: what is below one moves by the rest of the way.
+        for joint in np.flatnonzero(descendants(skeleton.parents, end)).tolist():
+            if names[joint] in found and names[joint] not in placed:
+                new[joint] += new[end] - found[names[end]]
+    return new
+
+
+def _bent(limb: list[Floats], new_upper: Floats, new_end: Floats) -> Floats:
+    """Return the middle joint (3,) of a limb of three joints, rotated and scaled to other ends."""
+    upper, middle, end = limb
+    before, after = end - upper, new_end - new_upper
+    length = float(np.linalg.norm(before))
+    scale = float(np.linalg.norm(after)) / length if length > 0.0 else 1.0
+    return new_upper + scale * quaternion_to_matrix(between(before, after)) @ (middle - upper)
