@@ -255,6 +255,33 @@ def test_fit_bends_an_arm_where_it_bent_and_moves_the_hand_along(drive, monkeypa
     assert_allclose(finger - wrist, [2, -0.2, 0.1], atol=1e-9)
 
 
+@pytest.mark.usefixtures("quick_fits")
+@pytest.mark.parametrize(
+    ("leave", "why"),
+    [
+        (lambda hand: hand.click("Done###edit done"), "Edit skeleton was turned off"),
+        (lambda hand: hand.menu("menu Edit", "Undo"), "the joints were edited"),
+    ],
+)
+def test_fit_that_comes_too_late_changes_nothing_and_says_why(drive, monkeypatch, leave, why):
+    hand = opened(drive, bar(), half_bar("root", "end"), start="template", fits=False, facing="z")
+    hand.state.of(JointEditing).choices.weights = "keep"
+    pull(hand, joints(hand)[1], (2.0, 0.2, 0.0), held="ctrl")
+    gate = threading.Event()
+
+    def fitted(*_):
+        assert gate.wait(60)
+        return {"root": FAR, "end": FAR}
+
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
+    hand.click("Fit the other joints")
+    leave(hand)
+    left = figure(hand)
+    gate.set()
+    hand.finish_job()
+    assert figure(hand) is left and hand.says(f"Not fitted: {why} meanwhile")
+
+
 def test_symmetric_edits_mirroring_and_removal(drive):
     hand = opened(drive, bar())
     editing = hand.state.of(JointEditing)

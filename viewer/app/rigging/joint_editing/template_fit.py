@@ -55,7 +55,10 @@ def refit(state: AppState) -> None:
         found = fit_again(fit.template, mesh, places, placed)
 
         def finish(state: AppState) -> None:
-            if edited(state) is not actor or actor.figure.skeleton is not skeleton:
+            if edited(state) is not actor:
+                state.say("Not fitted: Edit skeleton was turned off meanwhile")
+                return
+            if actor.figure.skeleton is not skeleton:
                 state.say("Not fitted: the joints were edited meanwhile")
                 return
             new = _followed(skeleton, places, found, placed)
