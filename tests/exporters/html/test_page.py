@@ -345,6 +345,13 @@ def test_page_permits_only_its_own_scripts_and_escapes_names(tmp_path):
     assert not re.search(r"https?://", re.sub(r'id="data">.*?<', "", text))
 
 
+def test_undecodable_characters_of_names_become_question_marks(tmp_path):
+    path = tmp_path / "a.html"
+    viewer.export(viewer.Actor(viewer.figure(np.eye(3), [[0, 1, 2]], name="caf\udce9")), path)
+    assert 'aria-label="caf?: 3D view"' in path.read_text("utf-8")
+    assert header_of(path)["figures"][0]["name"] == "caf\udce9"
+
+
 def header_of(path):
     """Return the page's header, which states everything but the numbers."""
     text = path.read_text("utf-8")

@@ -29,6 +29,7 @@ from viewer.exporters._left_out import motion_notes, of_figure
 from viewer.exporters._losses.largest_distances import REGULAR, evenly
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
+from viewer.exporters.gltf.document import text_of
 from viewer.exporters.html.figures import is_lit, pack_mesh, pack_skin, pack_studio, plain
 from viewer.exporters.html.motion import Tracks, pack_dofs, pack_tracks, size_of, tracks_of
 from viewer.exporters.html.packing import Packer, unpacked
@@ -373,14 +374,14 @@ def _page(header: Json, data: str, poster: str, description: str, caption: str) 
         f"script-src {_hash_of(script)}; style-src {_hash_of(style)}"
     )
     page = (_FOLDER / "page.html").read_text("utf-8")
-    picture = f'<img id="poster" alt="{html.escape(description)}" src="{poster}">' if poster else ""
+    picture = f'<img id="poster" alt="{_escaped(description)}" src="{poster}">' if poster else ""
     parts = {
         "policy": policy,
-        "title": html.escape(header["title"]),
-        "description": html.escape(description),
+        "title": _escaped(header["title"]),
+        "description": _escaped(description),
         "style": style,
         "poster": picture,
-        "caption": html.escape(caption),
+        "caption": _escaped(caption),
         "header": text,
         "data": data,
         "script": script,
@@ -390,6 +391,10 @@ def _page(header: Json, data: str, poster: str, description: str, caption: str) 
     return pieces[0] + "".join(
         parts[name] + rest for name, rest in (piece.split("}}", 1) for piece in pieces[1:])
     )
+
+
+def _escaped(text: str) -> str:
+    return html.escape(text_of(text))
 
 
 def _hash_of(text: str) -> str:
