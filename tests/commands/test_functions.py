@@ -266,6 +266,8 @@ TINY = (32, 24)
         (lambda: viewer.export([ACT], "x.glb"), "^export: expected a scene or an actor, found"),
         (lambda: viewer.export(ACT, 3), "^path: expected a text or Path, found int"),
         (lambda: viewer.export(ACT, "x.glb", frames="1:2"), r"^frames: expected a range such as"),
+        (lambda: viewer.export(ACT, "x.bvh", fps=0), "^fps: expected 0.001 to 100,000 frames per"),
+        (lambda: viewer.video(ACT, "x.gif", fps=-1.0), "^fps: expected 0.001 to 100,000 frames pe"),
         (lambda: viewer.export(ACT, "x.qqq"), 'no exporter'),
         (lambda: viewer.video(ACT, "x.gif", frames=[1]), "^frames: expected a range such as"),
         (lambda: viewer.render(ACT, 32), r"^size: expected two integers, such as \(640, 360\)"),

@@ -93,7 +93,7 @@ def export(
             raise ViewerError(f"frames: expected a step of 1, found {frames.step}")
         asked.frames.frames = f"{frames.start}:{frames.stop}"
     with without_dashes():
-        asked.frames.check_range()
+        asked.frames.check()
         if time is not None:
             scene = scene_at(scene, time)
         selection, chosen, notes = selected(asked, chosen, scene, Path(path))

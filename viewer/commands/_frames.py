@@ -15,6 +15,7 @@ from viewer.phrases import printable
 from viewer.rigs.scene import Actor, Scene
 
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # limits of frame rates, frames per second
+_RATE = f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames per second, found {{found}}"
 _LAST_NUMBER = 1_000_000_000
 _RANGE = "frames A to B - 1{step}; A or B may be omitted (default: the whole motion)"
 
@@ -119,9 +120,7 @@ def rate(text: str) -> float:
     """Return the frame rate given to an option; raises as ``number`` does."""
     value = number(text)
     if not _SLOWEST <= value <= _FASTEST:
-        raise argparse.ArgumentTypeError(
-            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames per second, found {text}"
-        )
+        raise argparse.ArgumentTypeError(_RATE.format(found=text))
     return value
 
 
@@ -153,8 +152,10 @@ class Frames:
         """Whether a single frame or time is requested."""
         return self.frame is not None or self.time is not None
 
-    def check_range(self) -> None:
-        """Check that a range of frames and a single one are not both given."""
+    def check(self) -> None:
+        """Check the rate, and that a range of frames and a single one are not both given."""
+        if self.fps is not None and not _SLOWEST <= self.fps <= _FASTEST:
+            raise ViewerError(f"--fps: {_RATE.format(found=self.fps)}")
         for option in ("frame", "time"):
             if self.frames is not None and getattr(self, option) is not None:
                 raise ViewerError(f"--frames and --{option}: expected one of them, found both")

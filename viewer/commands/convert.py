@@ -202,7 +202,7 @@ def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
 
 def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:
     """Check the output before anything is read."""
-    asked.frames.check_range()
+    asked.frames.check()
     require_stdout(output)
     if is_stdout(output) and not output.suffix:
         name = printable(output, 300)

@@ -331,7 +331,7 @@ def complete(
         request.kind = "pictures"
     if request.kind and panels:
         raise ViewerError("--panels: applies to single images only, not to videos or sequences")
-    frames.check_range()
+    frames.check()
     if view.follow is not None and view.look_at is not None:
         raise ViewerError("--follow and --look-at: expected one of them, found both")
     _check_onion(request, frames, view)
