@@ -24,9 +24,8 @@ _ABOVE = {
 }
 """Required ancestor of each listed bone."""
 _ALL_ABOVE = {
-    **{"neck": "upperChest", "head": "neck"},
-    **{f"{side}Shoulder": "upperChest" for side in ("left", "right")},
-    **{f"{side}UpperArm": f"{side}Shoulder" for side in ("left", "right")},
+    **{"neck": "upperChest", "leftShoulder": "upperChest", "rightShoulder": "upperChest"},
+    **{"head": "neck", "leftUpperArm": "leftShoulder", "rightUpperArm": "rightShoulder"},
 }
 """Ancestors of bones in a complete skeleton, where optional bones are between required ones."""
 _FINGERS = ("Index", "Middle", "Ring", "Little")
