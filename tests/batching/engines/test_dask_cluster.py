@@ -4,7 +4,6 @@ import itertools
 import os
 import signal
 from collections import Counter
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,35 +33,33 @@ from viewer.batching.engines import dask_cluster
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
-@contextmanager
-def two_workers(folder):
-    """Start a scheduler with two worker processes; the second declares a GPU. Yield its address."""
+@pytest.fixture(scope="module")
+def two_workers(tmp_path_factory):
+    """A cluster of two worker processes, of which the second declares a GPU."""
+    import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
     common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None,
-              "local_directory": str(folder)}  # fmt: skip
+              "local_directory": str(tmp_path_factory.mktemp("dask"))}  # fmt: skip
     workers = {
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
     }
     options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
     scheduler = {"cls": Scheduler, "options": options}
-    with SpecCluster(workers, scheduler, silence_logs=50) as cluster:
-        yield cluster.scheduler_address
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    """The address of a scheduler for tests that kill none of its workers."""
-    with two_workers(tmp_path_factory.mktemp("dask")) as found:
-        yield found
+    # Workers that a test kills have this long to restart.
+    with (
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "60s"}),
+        SpecCluster(workers, scheduler, silence_logs=50) as cluster,
+    ):
+        yield cluster
 
 
 @pytest.fixture
-def mortal(tmp_path_factory):
-    """The address of a scheduler whose workers may be killed: Dask may fail to restart them."""
-    with two_workers(tmp_path_factory.mktemp("dask")) as found:
-        yield found
+def address(two_workers):
+    """The address of a scheduler that has both of its workers; a test may kill one."""
+    two_workers.wait_for_workers(2, timeout=60)
+    return two_workers.scheduler_address
 
 
 def finished(job, some, limits, on_result=lambda result: None):
@@ -89,7 +86,7 @@ def test_local_cluster_reports_crashes_hangs_and_defects():
     assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
 
 
-def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path):
+def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path):
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
     first = []
 
@@ -98,7 +95,7 @@ def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path):
             first.append(int((tmp_path / str(result.item.index)).read_text()))
             os.kill(first[0], signal.SIGKILL)
 
-    found = finished(Job(seconds=0.02), some, Limits(2, cluster=mortal), kill)
+    found = finished(Job(seconds=0.02), some, Limits(2, cluster=address), kill)
     assert {one.status for one in found.values()} == {"done"} and first
     runs = [len(path.read_text().split()) for path in tmp_path.iterdir()]
     assert len(runs) == 60
@@ -106,7 +103,7 @@ def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path):
     assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
 
 
-@pytest.mark.parametrize("where", ["local", "mortal"])
+@pytest.mark.parametrize("where", ["local", "address"])
 def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path):
     cluster = where if where == "local" else request.getfixturevalue(where)
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(600)]
@@ -146,6 +143,7 @@ def test_items_at_fault_are_found_within_tasks(tmp_path):
 
 def test_workers_that_dask_gives_up_are_replaced(monkeypatch):
     monkeypatch.setitem(dask_cluster._CONFIG, "distributed.deploy.lost-worker-timeout", "1ms")
+    monkeypatch.setattr(dask_cluster, "_FETCH", 0.5)  # results of such a worker are lost
     # Dask may close a worker that has just restarted and runs another item: that is tried again.
     found = finished(Job(), items(20, crash=5), Limits(1, retries=1, cluster="local"))
     assert {n for n, one in found.items() if one.status != "done"} == {5}
