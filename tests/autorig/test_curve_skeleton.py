@@ -12,7 +12,14 @@ from scipy.spatial import ConvexHull
 import viewer
 from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.curve_skeleton import Chain, Tree, _Plane, find_skeleton, paired_chains
+from viewer.autorig.curve_skeleton import (
+    Chain,
+    Tree,
+    _Plane,
+    distinct_places,
+    find_skeleton,
+    paired_chains,
+)
 from viewer.autorig.medial import Protrusion
 from viewer.autorig.parts import parts_of
 from viewer.autorig.settings import SkeletonSettings
@@ -235,6 +242,12 @@ def test_loop_is_cut_where_a_limb_only_touches_the_trunk():
     while above[-1] != "root":
         above.append(parent_of(result.figure.skeleton, above[-1]))
     assert min(np.linalg.norm(joints[name] - [0.9, 1.9, 0.0]) for name in above) < 0.2
+
+
+def test_cuts_beside_each_other_are_reported_once():
+    places = np.array([[0.0, 0, 0], [5, 0, 0], [0, 1.5, 0], [0, 3.1, 0]])
+    assert_allclose(distinct_places(places, 2.0), places[[0, 1, 3]])
+    assert distinct_places(places[:0], 2.0).shape == (0, 3)
 
 
 def test_small_holes_are_no_loops(monkeypatch):

@@ -56,6 +56,7 @@ _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of t
 # fraction of the solid there for which sheets are reported.
 _FAR, _MISSED = 2.0, 0.1
 _MOST_LOOPS = 20  # loops that are cut: each takes a search
+_SAME = 2.0  # distance in voxels up to which cuts are one: some need two searches
 # Least radius, relative to the largest one, of the place where the search for the trunk begins: the
 # deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
 _DEEP = 0.75
@@ -812,8 +813,17 @@ def joints_in(
         labels.limbs,
         labels.pairs,
         _missed(solid, tree),
-        tree.cuts,
+        distinct_places(tree.cuts, _SAME * solid.spacing),
     )
+
+
+def distinct_places(places: Floats, least: float) -> Floats:
+    """Return the places (N, 3) that are farther than ``least`` from all returned before."""
+    found = np.zeros((0, 3))
+    for place in places:
+        if (np.linalg.norm(found - place, axis=1) > least).all():
+            found = np.concatenate([found, place[None]])
+    return found
 
 
 def _missed(solid: Solid, tree: Tree) -> float:
