@@ -146,6 +146,15 @@ def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
     for place in places:
         x, y = np.array(view_frame(hand.state).place(place)) * scale
         assert changed[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].any()
+    shown = hand.app.pixels()
+    target = hand.state.scene.actors.pop(0)
+    hand.step(2)
+    gone = hand.app.pixels()
+    hand.state.job.found = None
+    hand.step(2)
+    assert hand.state.job is not None and (hand.app.pixels() == gone).all()  # none without a target
+    hand.state.scene.actors.insert(0, target)
+    assert (shown != gone).any()
     hand.key("escape")
     hand.finish_job()
     x, y = np.array(view_frame(hand.state).place(places[1])) * scale

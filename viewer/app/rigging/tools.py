@@ -146,10 +146,10 @@ def _draw_found(state: AppState) -> None:
     found = None if running is None or running.job is None else running.job.found
     if running is None or running.target is None or not isinstance(found, FittedJoints):
         return
-    pen, places = (
-        Pen(view_frame(state)),
-        apply_transform(target_place(running.target), found.places),
-    )
+    if not any(running.target is actor for actor in state.scene.actors):
+        return  # another file was opened meanwhile, or the target was removed
+    pen = Pen(view_frame(state))
+    places = apply_transform(target_place(running.target), found.places)
     pen.list.push_clip_rect((x, y), (x + width, y + height), True)
     for joint, parent in enumerate(found.parents.tolist()):
         if parent >= 0:
