@@ -141,6 +141,16 @@ def test_hands_stay_outside_of_a_stout_body(is_shaped):
     assert (after >= np.minimum(before, 22.0) - 0.5).all()
 
 
+def test_distance_that_short_arms_cannot_reach_is_reported():
+    # The straight arms of 54 cm of the source end beside the thighs. Those of the figure are half
+    # as long, from the same shoulders, so that 27 cm are missing in every frame.
+    figure = body(arms=0.5)
+    found, _, changes = kept(figure, motion(0.0, 0.0))
+    assert_allclose((changes.least, changes.after), 27.0 / HEIGHT, rtol=1e-3)
+    _, text = map(str, hand_notes(changes, found, figure))
+    assert text.startswith("arms of other are too short") and "by 19.7 % of" in text
+
+
 def with_hands(figure, reach):
     """Return a figure with soles at height 0, and fingers that end ``reach`` beyond the wrists."""
     names = list(figure.skeleton.names)

@@ -55,6 +55,7 @@ _TOGETHER, _APART = 0.08, 0.17  # the same for two wrists: 0.06 where hands clap
 # of the height of a person.
 _SLACK = 0.025
 _EXTENDED = 0.97  # maximum extension of an arm: its elbow is bent by 28 degrees
+_SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _SLACK
 _GIRTH = 75.0  # percentile of the distances of the skin from a bone that is taken as its radius
 
 
@@ -66,6 +67,8 @@ class KeptHands:
     after: float
     """Mean distances, relative to the height from ankles to neck, weighted by nearness; 0 if no
     hand was moved to the body."""
+    least: float = 0.0
+    """The same distance with straight arms: what is left because they are too short."""
     lifted: float = 0.0
     """Largest distance, in figure units, by which a hand was lifted to stay above the ground."""
 
@@ -125,7 +128,7 @@ def keep_hands(
         return given, None
     radii = _radii(shape, mine, body.height)
     shifts, nearness, together = _shifts(body, other, found.to_target, radii)
-    before = _error(shifts, nearness)
+    before, least = (_error(each, nearness) for each in (shifts, _out_of_reach(body, shifts)))
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
     shifts = [
@@ -148,12 +151,14 @@ def keep_hands(
     kept = replace(clip, rotations=rotations)
     reached = _Body(skeleton, kept, mine, rests)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    misses = (before, _error(wished, nearness)) if touches else (0.0, 0.0)
-    return kept, KeptHands(*misses, body.height * float(lifts.max()))
+    lifted = body.height * float(lifts.max())
+    if not touches:
+        return kept, KeptHands(0.0, 0.0, lifted=lifted)
+    return kept, KeptHands(before, _error(wished, nearness), least, lifted)
 
 
 def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
-    """Return a message about the change made by keeping hands at the body."""
+    """Return messages about the changes made by keeping hands at the body."""
     if kept is None:
         return []
     notes: list[Diagnostic] = []
@@ -169,6 +174,16 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
                 after=100.0 * kept.after,
                 before=100.0 * kept.before,
                 remedy=remedy,
+            )
+        )
+    if kept.least > _SHORT:
+        notes.append(
+            note(
+                "F007.hands-short: arms of {figure} are too short to touch its body where those of "
+                "{motion} do: straight, they would still miss by {least:.1f} % of the height from "
+                "ankles to neck",
+                **called,
+                least=100.0 * kept.least,
             )
         )
     if kept.lifted:
@@ -290,6 +305,21 @@ def _lifts(
         theirs = scale * (other.at(arm[2]) @ found.to_target.T @ up - level) - length
         lifts.append(np.maximum(ground + np.minimum(theirs, 0.0) - low - shift @ up, 0.0))
     return np.stack(lifts)
+
+
+def _out_of_reach(body: _Body, shifts: list[Floats]) -> list[Floats]:
+    """Return the parts of shifts (N, 3) that are left where arms are straight.
+
+    By the triangle inequality, no elbow brings the wrist nearer to a place than the distance from
+    the shoulder less the lengths of both bones.
+    """
+    left = []
+    for arm, shift in zip(_ARMS, shifts, strict=True):
+        shoulder, elbow, wrist = (body.at(name) for name in arm)
+        length = np.linalg.norm(elbow - shoulder, axis=1) + np.linalg.norm(wrist - elbow, axis=1)
+        away = wrist + shift - shoulder
+        left.append(_beyond_slack(away, length))
+    return left
 
 
 def _error(shifts: list[Floats], nearness: list[Floats]) -> float:
