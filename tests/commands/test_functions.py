@@ -268,6 +268,8 @@ TINY = (32, 24)
         (lambda: viewer.export(ACT, "x.glb", frames="1:2"), r"^frames: expected a range such as"),
         (lambda: viewer.export(ACT, "x.bvh", fps=0), "^fps: expected 0.001 to 100,000 frames per"),
         (lambda: viewer.video(ACT, "x.gif", fps=-1.0), "^fps: expected 0.001 to 100,000 frames pe"),
+        (lambda: setattr(viewer.load("fox")[0], "pose", ACT.pose),
+         "^pose of fox: expected 114 DOFs of 37 joints, found 6 of 2"),
         (lambda: viewer.export(ACT, "x.qqq"), 'no exporter'),
         (lambda: viewer.video(ACT, "x.gif", frames=[1]), "^frames: expected a range such as"),
         (lambda: viewer.render(ACT, 32), r"^size: expected two integers, such as \(640, 360\)"),

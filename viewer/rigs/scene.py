@@ -172,6 +172,14 @@ class Actor:
     @pose.setter
     def pose(self, pose: Pose) -> None:
         check_type("pose", pose, Pose)
+        skeleton = self.figure.skeleton
+        if skeleton is not None:
+            wanted, found = (skeleton.n_dofs, skeleton.n_joints), (pose.n_dofs, len(pose.rotations))
+            if wanted != found:
+                raise RigError(
+                    f"pose of {self.name}: expected {counted(wanted[0], 'DOF')} of "
+                    f"{counted(wanted[1], 'joint')}, found {found[0]} of {found[1]}"
+                )
         self.own_pose = pose
 
     def require_clip(self) -> Motion:
