@@ -61,8 +61,8 @@ def refit(state: AppState) -> None:
             if actor.figure.skeleton is not skeleton:
                 state.say("Not fitted: the joints were edited meanwhile")
                 return
-            new = _followed(skeleton, places, found, placed)
-            new = _with_limbs(skeleton, new, first, found, placed)
+            known = found | {name: places[name] for name in placed}
+            new = _followed(skeleton, places, _with_limbs(skeleton, known, first, placed))
             commit(state, moved(figure, dict(enumerate(new))), "fit the other joints")
 
         return finish
@@ -76,46 +76,41 @@ def _places(figure: Figure) -> dict[str, Floats]:
     return dict(zip(names, rest_worlds(figure)[:, :3, 3], strict=True))
 
 
-def _followed(
+def _with_limbs(
     skeleton: Skeleton,
     places: Mapping[str, Floats],
-    found: Mapping[str, Floats],
+    first: Mapping[str, Floats],
     placed: Collection[str],
-) -> Floats:
-    """Return the places (J, 3) of the joints: as placed by hand, or else as found."""
-    new = np.zeros((skeleton.n_joints, 3))
-    for joint, name in enumerate(skeleton.names):
-        above, place = int(skeleton.parents[joint]), places[name]
-        # Joints that the template does not have move with those above them.
-        along = new[above] - places[skeleton.names[above]] if above >= 0 else 0.0
-        new[joint] = place if name in placed else found.get(name, place + along)
+) -> dict[str, Floats]:
+    """Return places (3,) by name, with limbs whose ends were placed bent as in the first fit."""
+    names, meanings, new = skeleton.names, joint_meanings(skeleton), dict(places)
+    for limb in LIMBS:
+        if not set(limb) <= set(meanings):
+            continue
+        joints = [meanings.index(joint) for joint in limb]
+        upper, middle, end = (names[joint] for joint in joints)
+        if end not in placed or not {upper, middle, end} <= first.keys():
+            continue
+        # The fit reaches a wrist by rotating the whole arm and hand, which says little about elbow
+        # and fingers.
+        if middle not in placed:
+            new[middle] = _bent([first[upper], first[middle], first[end]], new[upper], new[end])
+        for joint in np.flatnonzero(descendants(skeleton.parents, joints[-1])).tolist():
+            name = names[joint]
+            if name in first and name not in placed:
+                new[name] = new[end] + first[name] - first[end]
     return new
 
 
-def _with_limbs(
-    skeleton: Skeleton,
-    new: Floats,
-    first: Mapping[str, Floats],
-    found: Mapping[str, Floats],
-    placed: Collection[str],
+def _followed(
+    skeleton: Skeleton, places: Mapping[str, Floats], known: Mapping[str, Floats]
 ) -> Floats:
-    """Return the places (J, 3) with arms and legs whose ends were placed bent as at ``first``."""
-    names, meanings, new = skeleton.names, joint_meanings(skeleton), new.copy()
-    for limb in LIMBS:
-        joints = [meanings.index(joint) for joint in limb if joint in meanings]
-        if len(joints) < len(limb) or not {names[one] for one in joints} <= first.keys():
-            continue
-        upper, middle, end = joints
-        if names[end] not in placed:
-            continue
-        if names[middle] not in placed:
-            # The fit reaches a wrist by rotating the whole arm, which says little about the elbow.
-            before = [first[names[one]] for one in joints]
-            new[middle] = _bent(before, new[upper], new[end])
-        # The fit comes close to a landmark only: what is below one moves by the rest of the way.
-        for joint in np.flatnonzero(descendants(skeleton.parents, end)).tolist():
-            if names[joint] in found and names[joint] not in placed:
-                new[joint] += new[end] - found[names[end]]
+    """Return new places (J, 3): the known ones; all other joints move with those above them."""
+    new = np.zeros((skeleton.n_joints, 3))
+    for joint, name in enumerate(skeleton.names):
+        above = int(skeleton.parents[joint])
+        along = new[above] - places[skeleton.names[above]] if above >= 0 else 0.0
+        new[joint] = known.get(name, places[name] + along)
     return new
 
 
