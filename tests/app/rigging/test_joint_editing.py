@@ -20,7 +20,7 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import TransferSettings
 from viewer.progress import report
 from viewer.rigs.figure import Figure
-from viewer.rigs.joint_edits import rest_worlds
+from viewer.rigs.joint_edits import moved, rest_worlds
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import ball_skeleton
@@ -280,6 +280,22 @@ def test_fit_that_comes_too_late_changes_nothing_and_says_why(drive, monkeypatch
     gate.set()
     hand.finish_job()
     assert figure(hand) is left and hand.says(f"Not fitted: {why} meanwhile")
+
+
+def test_drag_says_so_when_other_joints_end_it(drive):
+    hand = opened(drive, bar())
+    before = joints(hand)
+    start = seen(hand, *before[0])
+    hand.move(start)
+    hand.press()
+    hand.move((start[0] + 40, start[1]))
+    actor = hand.state.scene.actors[0]
+    actor.figure = moved(actor.figure, {0: FAR + np.array([2.0, 0.0, 0.0])})
+    hand.move((start[0] + 80, start[1]))
+    assert hand.says("Drag cancelled: the joints were changed meanwhile")
+    hand.let_go()
+    hand.step(2)
+    assert_allclose(joints(hand), [[2, 0, 0]], atol=1e-9)
 
 
 def test_symmetric_edits_mirroring_and_removal(drive):

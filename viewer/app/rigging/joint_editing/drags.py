@@ -61,7 +61,9 @@ def _go_on(state: AppState, drag: JointDrag, at: Place) -> None:
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_joint_drag(state)
     if actor is None or actor.figure.skeleton is not drag.skeleton:
-        drag.is_over = True  # undone, or closed
+        if actor is not None and not drag.is_over:  # undone, or fitted again
+            state.say_status("Drag cancelled: the joints were changed meanwhile")
+        drag.is_over = True
     if drag.is_over or actor is None:
         editing.drag = drag if imgui.is_mouse_down(_LEFT) else None
         return
