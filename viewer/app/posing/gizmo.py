@@ -500,9 +500,10 @@ def _present(joint: PosedJoint, axis: Floats, kind: int) -> Floats:
     own = joint.axes("local")
     across = _without(_bone(joint), axis)
     if np.linalg.norm(across) < _ALONG:
-        # Use the more perpendicular of the joint's other two axes, whose projection cannot vanish.
-        others = [_without(own[:, (kind + k) % 3], axis) for k in (1, 2)]
-        across = max(others, key=lambda vector: float(np.linalg.norm(vector)))
+        # The squared projections of the joint's other two axes sum to at least 1. The first is used
+        # unless it is the short one: of two equal ones, rounding must not choose.
+        first, second = (_without(own[:, (kind + k) % 3], axis) for k in (1, 2))
+        across = first if first @ first >= 0.5 else second
     return unit(across)
 
 
