@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from live.test_messages import framed
+from live.test_live_messages import framed
 from live_screen import can_undo, screen_at
 
 import viewer
