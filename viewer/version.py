@@ -1,3 +1,3 @@
 """Version of the program, without importing anything."""
 
-VERSION = "0.5.0"
+VERSION = "0.6.0"
