@@ -169,11 +169,7 @@ def test_address_selects_what_a_frame_shows(browser, tmp_path):
     viewer.export(actor, tmp_path / "a.html")
     frame = '<iframe src="a.html#bare&time=0.2&skeleton" width="300" height="200"></iframe>'
     (tmp_path / "b.html").write_text(frame, "utf-8")
-    browser.open(tmp_path / "a.html")
-    browser.run("location.hash = '#bare&time=0.2&skeleton'; location.reload()")
-    browser.run("new Promise(done => setTimeout(done, 300))")
-    browser.run("viewer.ready.then(() => null)")
-    browser.settle()
+    browser.open(tmp_path / "a.html", "bare&time=0.2&skeleton")
     assert browser.run("viewer.ready.then(page => page.time)") == pytest.approx(0.2)
     shown = "[...document.querySelectorAll('#panels, #timeline')].map(each => each.offsetHeight)"
     assert browser.run(shown) == [0, 0]
