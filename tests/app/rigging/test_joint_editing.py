@@ -345,6 +345,7 @@ def test_cancelled_binding_and_drags_leave_the_figure(drive, monkeypatch):
     hand.let_go()
     hand.step(2)
     assert figure(hand) is before and hand.says("Drag cancelled")
+    hand.finish_job()  # the cancelled binding of the drag
     gate = threading.Event()
 
     def waiting(*arguments):
