@@ -1,6 +1,7 @@
 """Skeletons found in shapes made of tubes, whose joints are known."""
 
 import re
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -29,6 +30,7 @@ from viewer.errors import RigError
 from viewer.exporters import export
 from viewer.progress import Cancelled, receiving
 from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import triangle_areas
 from viewer.rigs.scene import Actor
 
 
@@ -322,6 +324,97 @@ def test_rods_of_an_arm_move_rigidly(robot, tmp_path):
     rods = [weights[owners == part] for part in (1, 2, 3)]
     assert all((each.max(axis=1) > 0.99).mean() > 0.95 for each in rods)
     assert len({int(each.sum(axis=0).argmax()) for each in rods}) == 3
+
+
+def rod(start, end, half_width):
+    """Return a box between two points, without vertices in between."""
+    start, way = np.asarray(start, dtype=float), np.subtract(end, start).astype(float)
+    length = np.linalg.norm(way)
+    corners, faces = box((-half_width, -half_width, 0), (half_width, half_width, length))
+    across = np.cross(way / length, [0.0, 0, 1] if abs(way[2]) < 0.5 * length else [1.0, 0, 0])
+    across /= np.linalg.norm(across)
+    axes = np.stack([across, np.cross(way / length, across), way / length])
+    return start + corners @ axes, faces
+
+
+def test_rods_without_vertices_in_between_have_joints_at_their_ends_only(tmp_path):
+    # 1.4 and 1.3 long and 0.08 wide: a limb that bends would have six joints in each.
+    elbow, tip = np.array([0.0, 1.5, 0.5]), np.array([0.0, 0.8, 1.6])
+    foot = pipe([(0, -0.05, 0), (0, 0.1, 0)], 0.4, around=16)
+    ball = pipe([np.add(elbow, [x, 0, 0]) for x in (-0.08, 0.08)], 0.1)
+    shape = united(foot, rod((0, 0.1, 0), elbow, 0.04), rod(elbow, tip, 0.04), ball)
+    skeleton = found(shape).figure.skeleton
+    places = np.array([*joints_of(skeleton).values()])
+    for start, end in (([0.0, 0.1, 0.0], elbow), (elbow, tip)):
+        middle, length = 0.5 * np.add(start, end), np.linalg.norm(end - start)
+        assert np.linalg.norm(places - middle, axis=1).min() > 0.3 * length
+    assert np.linalg.norm(places - elbow, axis=1).min() < 0.15
+    # And each rod moves with one joint.
+    target, output = tmp_path / "lamp.obj", tmp_path / "lamp.glb"
+    export(Actor(Figure("lamp", mesh_of(*shape))), target)
+    assert run(["rig", str(target), "--auto", "-o", str(output)]) == 0
+    skin = viewer.load(output).actors[0].figure.skin
+    count = np.diff(skin.starts)
+    first = len(foot[0])
+    assert (count[first : first + 16] == 1).all()
+    own = skin.joints[skin.starts[first : first + 16]].reshape(2, 8)
+    assert (own == own[:, :1]).all() and own[0, 0] != own[1, 0]
+
+
+def test_chain_of_many_small_parts_is_rigged_and_the_limit_said(monkeypatch):
+    half_resolution(monkeypatch)
+    # 120 alike parts: each has less than a hundredth of the surface.
+    beads = [box((x - 0.06, -0.06, -0.06), (x + 0.06, 0.06, 0.06)) for x in 0.1 * np.arange(120)]
+    result = found(united(*beads))
+    assert result.figure.skeleton.n_joints >= 5
+    said = [str(line) for line in result.lines]
+    assert "120 separate parts are rigged as one object" in said
+    (few,) = [line for line in result.lines if "100 largest parts" in str(line)]
+    assert few.severity == "warning"
+
+
+def test_small_parts_of_a_limb_have_hinges_too(monkeypatch):
+    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 64))
+    trunk = pipe([(0, 0, -1.2), (0, 0, 1.2)], 1.2, around=24)
+    corners = np.array([(1.1, 0, 0), (1.7, 0, 0), (2.3, 0, 0), (2.9, 0, 0)])
+    gap = [(0.0, 0, 0), (-0.03, 0, 0)]  # or their ends would be welded
+    rods = [pipe(np.add(ends, gap), 0.06, around=6) for ends in pairwise(corners)]
+    for (positions, triangles), share in ((trunk, 0.97), *((each, 0.0) for each in rods)):
+        area = triangle_areas(positions, triangles).sum()
+        assert share < area / triangle_areas(*united(trunk, *rods)).sum() < max(share + 0.03, 0.01)
+    joints = joints_of(found(united(trunk, *rods)).figure.skeleton)
+    along = [place[0] for place in joints.values() if 1.4 < place[0] < 2.6]
+    assert len(along) <= 3  # 5 if the limb were one smooth part
+    for hinge in (1.7, 2.3):
+        assert np.abs(np.subtract(along, hinge)).min() < 0.1
+
+
+def test_more_loops_than_are_cut_are_reported(monkeypatch):
+    monkeypatch.setattr(curve_skeleton, "_MOST_LOOPS", 1)
+    angles = np.linspace(0.0, 2 * np.pi, 25)
+    ring = pipe(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), 0.1)
+    both = found(united(ring, (ring[0] + [1.9, 0, 0], ring[1]))).lines
+    (left,) = [line for line in both if "more loops than the 1 " in str(line)]
+    assert left.severity == "warning"
+    assert not [line for line in found(ring).lines if "more loops" in str(line)]
+
+
+@pytest.mark.parametrize(
+    ("up", "turned", "front"),
+    [("y", np.eye(3), "+z"), ("y", turn([0, 1, 0], np.pi / 2), "+x"),
+     ("z", turn([1, 0, 0], np.pi / 2), "-y"),
+     ("z", turn([0, 0, 1], np.pi / 2) @ turn([1, 0, 0], np.pi / 2), "+x")],
+)  # fmt: skip
+def test_assumed_front_is_in_the_plane_of_symmetry(up, turned, front):
+    positions, triangles = beast()
+    result = found((positions @ turned.T, triangles), up=up)
+    (said,) = [str(line) for line in result.lines if "the front is" in str(line)]
+    assert said.endswith(f"the front is {front}")
+    joints = joints_of(result.figure.skeleton)
+    ahead = np.eye(3)["xyz".index(front[1])] * (-1.0 if front[0] == "-" else 1.0)
+    left = np.cross(np.eye(3)["xyz".index(up)], ahead)
+    assert joints["leg_1_left_end"] @ left > 0.5
+    assert joints["leg_1_left_end"] @ ahead > joints["leg_2_left_end"] @ ahead
 
 
 def test_a_few_stray_vertices_are_reported():

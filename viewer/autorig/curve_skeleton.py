@@ -34,7 +34,7 @@ from viewer.autorig.alignment.orientation_search import (
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.anatomy import Limb, arc_lengths, paired, sagittal_plane
 from viewer.autorig.medial import LevelSets, Paths, Protrusion
-from viewer.autorig.parts import Parts, parts_of
+from viewer.autorig.parts import MOST_PARTS, Parts, parts_of
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import Solid, solid_within
 from viewer.data_classes import dataclass
@@ -124,6 +124,8 @@ class Chain:
     """All tips beyond its start."""
     seams: tuple[float, ...] = ()
     """Lengths along the path at which one separate part of the mesh ends and another begins."""
+    stiff: tuple[bool, ...] = ()
+    """Whether the part before each of them, and the one behind the last, does not bend."""
 
     @property
     def length(self) -> float:
@@ -149,6 +151,8 @@ class Tree:
     """(C, 3). Places where loops were cut."""
     levels: Ints
     """(N,). Level set of each voxel."""
+    has_loops: bool = False
+    """Whether it has more loops, which were not cut."""
 
 
 def at_lengths(points: Floats, lengths: Floats) -> Floats:
@@ -169,16 +173,19 @@ class _Field:
         self._least = max(_SHORTEST * size, _VOXELS * solid.spacing)
         self.cuts = np.zeros((0, 3))
         """(C, 3). Places where loops were cut."""
+        self.has_loops = False
+        """Whether more loops are left."""
         while True:
             self.distances = csgraph.dijkstra(paths.steps, indices=[source], min_only=True)
             self._levels = LevelSets(paths.steps, self.distances, solid.spacing)
             self._widths = self._levels.half_widths(self.centers)
             loop = self._levels.loop(self._widths, self._least)
-            if loop is None or len(self.cuts) == _MOST_LOOPS:
+            if loop is None:
                 break
             above, below = (np.isin(self._levels.labels, part) for part in loop)
-            ends = paths.cut(above, below)
+            ends = None if len(self.cuts) == _MOST_LOOPS else paths.cut(above, below)
             if ends is None:
+                self.has_loops = True
                 break
             self.cuts = np.concatenate([self.cuts, self.centers[ends].mean(axis=0)[None]])
         self._middles = self._levels.middles(self.centers)
@@ -258,7 +265,16 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
     routes = tuple(field.routes.values())
-    return Tree(places, paths.radii[rows], rows, ordered, routes, field.cuts, field.levels)
+    return Tree(
+        places,
+        paths.radii[rows],
+        rows,
+        ordered,
+        routes,
+        field.cuts,
+        field.levels,
+        field.has_loops,
+    )
 
 
 def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner: bool) -> int:
@@ -425,15 +441,21 @@ def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, 
     if seams and seams[0] <= start + near:
         start = max(start, seams.pop(0))
         first = [start]
-    if not seams:
+    if not seams and not _is_stiff(chain, start, stop):
         inner, jointed = _inner_joints(chain, start, stop, spacing, factor)
         return np.array([*first, *inner, stop]), jointed
     found = first
     for begin, end in pairwise([start, *seams, stop]):
-        if end - begin > _RIGID * width:
+        if end - begin > _RIGID * width and not _is_stiff(chain, begin, end):
             found = [*found, *_inner_joints(chain, begin, end, spacing, factor)[0]]
         found = [*found, end]
     return np.array(found), True
+
+
+def _is_stiff(chain: Chain, begin: float, end: float) -> bool:
+    """Return whether the part around the middle of a piece of a chain does not bend."""
+    part = int(np.searchsorted(chain.seams, 0.5 * (begin + end)))
+    return part < len(chain.stiff) and chain.stiff[part]
 
 
 def _inner_joints(
@@ -455,8 +477,13 @@ def _inner_joints(
     return inner, jointed
 
 
-def _seams(lengths: Floats, owners: Ints, hinge: float) -> tuple[float, ...]:
-    """Return where the parts of a path (K,) meet, and the middles of parts up to ``hinge`` long."""
+def _seams(
+    lengths: Floats, owners: Ints, hinge: float
+) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Return where the parts of a path (K,) meet, and the parts before, between and behind.
+
+    A part up to ``hinge`` long between two others is one meeting place, its middle.
+    """
     firsts = np.flatnonzero(np.diff(owners, prepend=-1))
     starts = [float(lengths[first]) for first in firsts]
     labels = owners[firsts].tolist()
@@ -473,7 +500,7 @@ def _seams(lengths: Floats, owners: Ints, hinge: float) -> tuple[float, ...]:
                 del labels[short], starts[short]
         else:
             del labels[short], starts[max(short, 1)]
-    return tuple(starts[1:])
+    return tuple(starts[1:]), tuple(labels)
 
 
 def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
@@ -545,16 +572,16 @@ def _angles(corners: Floats) -> Floats:
     return angles
 
 
-def _parted(chain: Chain, solid: Solid, owners: Ints) -> Chain:
+def _parted(chain: Chain, solid: Solid, owners: Ints, stiff: Bools) -> Chain:
     """Return a chain with the places where separate parts of the mesh meet.
 
-    ``owners``: the part around each voxel, -1 where there is none.
+    ``owners``: the part around each voxel, -1 where there is none; ``stiff`` (P,): of all parts.
     """
     path = at_lengths(chain.points, np.arange(0.0, chain.length, 0.5 * solid.spacing))
     around, lengths = owners[solid.nearest(path)], arc_lengths(path)
     known = around >= 0
-    seams = _seams(lengths[known], around[known], _HINGE * chain.half_width)
-    return replace(chain, seams=seams)
+    seams, labels = _seams(lengths[known], around[known], _HINGE * chain.half_width)
+    return replace(chain, seams=seams, stiff=tuple(bool(stiff[each]) for each in labels))
 
 
 # Symmetry and names.
@@ -661,10 +688,8 @@ def find_skeleton(
         solid = solid_within(target.positions, target.triangles, _FINEST)
     n_stray = _check_one(target, solid)
     parts = parts_of(target, solid)
-    shares = np.sort(parts.shares)[::-1]
-    touching = 0.0 if parts.contact is None else float(shares[1])
     where = "" if parts.contact is None else listed([rounded(x) for x in parts.contact.tolist()])
-    if touching >= _OBJECT:
+    if parts.touching >= _OBJECT:
         raise RigError(
             f"expected one object, found separate ones that only touch, the largest at {where}; "
             "rig each object alone"
@@ -685,11 +710,19 @@ def find_skeleton(
         up="z" if named == "z" else "y" if named == "y" else source.up,
         unit=source.unit,
     )
-    lines = [*_lines(found, front, alignment.facing is None)]
+    lines = [*_lines(found, alignment.facing is None)]
     if parts.count > 1:
         n = counted(parts.count, "separate part", "is", "are")
         lines.append(note("R015.parts: {n} rigged as one object", n=n))
-    if touching >= _PART:
+    if parts.count > MOST_PARTS:
+        lines.append(
+            note(
+                "R016.many-parts: only the {most} largest parts were searched for hinges and for "
+                "separate objects that touch",
+                most=MOST_PARTS,
+            )
+        )
+    if parts.touching >= _PART:
         lines.append(
             note(
                 "R016.touching: a part only touches the others at {place}: a separate object "
@@ -715,7 +748,7 @@ def _check_one(target: Mesh, solid: Solid) -> int:
     return int(apart.sum())
 
 
-def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
+def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
     """Return messages about the joints, their symmetry and the front."""
     if len(found.names) == 1:
         yield note("R016.no-limbs: no limbs found: one joint moves the whole mesh")
@@ -733,6 +766,12 @@ def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
             "apart there",
             place=listed([rounded(value) for value in place.tolist()]),
         )
+    if found.has_loops:
+        yield note(
+            "R016.more-loops: more loops than the {n} that were cut: in each other loop, one side "
+            "has no joints; --skeleton takes a skeleton that has them",
+            n=len(found.cuts),
+        )
     if found.missed > _MISSED:
         yield note(
             "R016.loops: {missed:.0%} of the mesh is far from the skeleton: wide sheets have no "
@@ -743,8 +782,14 @@ def _lines(found: Joints, front: str, is_assumed: bool) -> Iterator[Diagnostic]:
         yield note(
             "R015.front: left and right, and numbers from front to back: assuming that the front "
             "is {front}",
-            front=f"{'-' * front.startswith('-') or '+'}{front[-1]}",
+            front=_axis_name(found.front),
         )
+
+
+def _axis_name(way: Floats) -> str:
+    """Return the axis next to a direction (3,), with its sign."""
+    axis = int(np.abs(way).argmax())
+    return f"{'+' if way[axis] > 0.0 else '-'}{'xyz'[axis]}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -764,6 +809,10 @@ class Joints:
     """Fraction of the solid that is far from the skeleton."""
     cuts: Floats
     """(C, 3). Places where loops were cut."""
+    has_loops: bool
+    """Whether there are more loops than were cut."""
+    front: Floats
+    """(3,). The direction that was taken as the front."""
 
 
 def joints_in(
@@ -783,8 +832,12 @@ def joints_in(
     report_fraction(0.8, "placing joints")
     if parts.count > 1:
         owners = parts.around(tree.levels)[tree.levels]
-        tree = replace(tree, chains=tuple(_parted(chain, solid, owners) for chain in tree.chains))
+        chains = tuple(_parted(chain, solid, owners, parts.stiff) for chain in tree.chains)
+        tree = replace(tree, chains=chains)
     plane, partner = _symmetry_of(solid, tree, up, front, how.symmetry)
+    if plane is not None and not is_facing_known:
+        # The front is in the plane of symmetry: a figure along x does not face along z.
+        front = np.cross(plane.lateral, up)
     points = _joint_points(tree, plane, partner, solid.spacing, how.joint_spacing)
     heights = solid.centers(solid.voxels) @ up
     low = float(heights.min()) + _ON_GROUND * float(np.ptp(heights))
@@ -814,6 +867,8 @@ def joints_in(
         labels.pairs,
         _missed(solid, tree),
         distinct_places(tree.cuts, _SAME * solid.spacing),
+        tree.has_loops,
+        front,
     )
 
 
@@ -871,8 +926,9 @@ def _plane_of(
         return None, fraction
     left = np.cross(up, front)
     if abs(float(lateral @ left)) < _ASKEW:
-        # The figure faces along another horizontal axis; which way is not known.
-        left = lateral if float(lateral @ np.ones(3)) >= 0.0 else -lateral
+        # The figure faces along the other horizontal axis: +x where y is up, -y where z is up, as
+        # most programs have it. Their left is -z and +x.
+        left = lateral if float(lateral @ [1.0, 1.0, -1.0]) >= 0.0 else -lateral
     if float(lateral @ left) < 0.0:
         lateral, offset = -lateral, -offset
     return _Plane(lateral, offset, up), fraction

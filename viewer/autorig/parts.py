@@ -14,15 +14,16 @@ import numpy as np
 
 from viewer.autorig.solid import Solid
 from viewer.autorig.surface.samples import sample_surface
-from viewer.autorig.surface.welding import one_sided, weld
+from viewer.autorig.surface.welding import one_sided, stiff_islands, weld
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.topology import components
 from viewer.rigs.mesh import Mesh, triangle_areas
 
-_SMALLEST = 0.01  # area of a part relative to the mesh's: an eye or a screw is none
-_MOST = 100  # parts, so that each is compared with all others
+MOST_PARTS = 100
+"""Parts that are told apart, the largest: each is compared with all others."""
 _SAMPLES = 20_000  # of the surface
+_LEAST = 8  # samples of a part: a screw still has a place and a thickness
 _GAP = 3.0  # distance in voxels up to which parts are joined: rounded ends, and gaps between links
 # Radius of the area where two parts are near each other, relative to the largest radius of the
 # thinner one: below it, they only touch.
@@ -38,47 +39,53 @@ class Parts:
     rows: Ints
     labels: Ints
     """(S,). Voxels of samples of the visible surface, as rows of the solid, and their parts."""
+    areas: Floats
+    """(S,). The area that each sample stands for."""
     objects: Ints
     """(P,). Parts that are joined have the same number."""
     shares: Floats
     """(O,). Fraction of the solid in each object."""
     contact: Floats | None
-    """(3,). Where the largest parts of two objects only touch; None if none do."""
-
-    @property
-    def count(self) -> int:
-        """Number of parts."""
-        return len(self.objects)
+    """(3,). Where two objects only touch, those of which the smaller one is largest; None if none
+    do."""
+    touching: float
+    """Fraction of the solid in the smaller of these two; 0 for none."""
+    stiff: Bools
+    """(P,). Parts without vertices between their ends, which do not bend."""
+    count: int
+    """Number of separate parts of the mesh: P, or more if only the largest are told apart."""
 
     def around(self, levels: Ints) -> Ints:
         """Return the part with most of the surface around each level set, -1 without any: (L,).
 
         ``levels`` (N,): level set of each voxel.
         """
-        votes = np.zeros((int(levels.max()) + 1, self.count))
-        np.add.at(votes, (levels[self.rows], self.labels), 1.0)
+        votes = np.zeros((int(levels.max()) + 1, len(self.objects)))
+        np.add.at(votes, (levels[self.rows], self.labels), self.areas)
         return np.where(votes.any(axis=1), votes.argmax(axis=1), -1).astype(np.int32)
 
 
 def parts_of(mesh: Mesh, solid: Solid) -> Parts:
-    """Return the separate parts of a mesh that are neither small nor many."""
+    """Return the separate parts of a mesh, the largest ``MOST_PARTS`` of many."""
     from scipy.spatial import cKDTree
 
     surface = one_sided(weld(mesh.positions, mesh.triangles))
     islands = surface.islands[surface.triangles[:, 0]]
     areas = np.bincount(islands, triangle_areas(surface.positions, surface.triangles))
-    large = np.argsort(-areas, kind="stable")[:_MOST]
-    large = large[areas[large] >= _SMALLEST * areas.sum()]
+    count = int((areas > 0.0).sum())
+    large = np.argsort(-areas, kind="stable")[: min(count, MOST_PARTS)]
     shares = areas[large] / areas.sum()
     samples = [
         _samples(surface.positions, surface.triangles[islands == island], share)
         for island, share in zip(large.tolist(), shares.tolist(), strict=True)
     ]
-    labels = np.repeat(np.arange(len(samples)), [len(each) for each in samples])
+    sizes = np.array([len(each) for each in samples])
+    labels = np.repeat(np.arange(len(samples)), sizes)
+    weights = np.repeat(shares / sizes, sizes)
     places = np.concatenate(samples)
     # The surface of one part inside another one is hidden.
     seen = solid.distance[tuple(solid.voxel_of(places).T)] <= _SEEN * solid.spacing
-    places, labels = places[seen], labels[seen]
+    places, labels, weights = places[seen], labels[seen], weights[seen]
     owners = labels[cKDTree(places).query(solid.centers(solid.voxels))[1]]
     widest = np.zeros(len(samples))
     np.maximum.at(widest, owners, solid.radii())
@@ -101,11 +108,25 @@ def parts_of(mesh: Mesh, solid: Solid) -> Parts:
     joined += _overlaps(solid, samples, each, _TOUCH * widest)
     lowest = components(len(samples), np.array(joined, dtype=np.int32).reshape(-1, 2))
     objects = np.unique(lowest, return_inverse=True)[1].astype(np.int32)
-    apart = (place for (a, b), place in touching.items() if objects[a] != objects[b])
-    contact = next(apart, None)
     shown = labels.astype(np.int32)
     filled = np.bincount(objects[owners], minlength=int(objects.max()) + 1) / len(owners)
-    return Parts(solid.nearest(places), shown, objects, filled, contact)
+    apart = {
+        pair: min(float(filled[objects[part]]) for part in pair)
+        for pair in touching
+        if objects[pair[0]] != objects[pair[1]]
+    }
+    largest = max(apart, key=lambda pair: apart[pair], default=None)
+    return Parts(
+        solid.nearest(places),
+        shown,
+        weights,
+        objects,
+        filled,
+        None if largest is None else touching[largest],
+        0.0 if largest is None else apart[largest],
+        stiff_islands(surface)[large],
+        count,
+    )
 
 
 def _overlaps(
@@ -117,7 +138,8 @@ def _overlaps(
     for number, own in enumerate(samples):
         depths = solid.distance[tuple(solid.voxel_of(own).T)]
         inside = own[depths > _DEEP * solid.spacing]
-        if np.sqrt(area * len(inside) / np.pi) < least[number] or len(samples) == 1:
+        is_small = np.sqrt(area * len(inside) / np.pi) < least[number]
+        if is_small or len(inside) == 0 or len(samples) == 1:
             continue
         others = [k for k in range(len(samples)) if k != number]
         gaps = [float(cKDTree(samples[k]).query(inside)[0].mean()) for k in others]
@@ -131,4 +153,4 @@ def _half_thickness(points: Floats) -> float:
 
 
 def _samples(positions: Floats, triangles: Ints, fraction: float) -> Floats:
-    return sample_surface(positions, triangles, max(8, round(fraction * _SAMPLES))).positions
+    return sample_surface(positions, triangles, max(_LEAST, round(fraction * _SAMPLES))).positions

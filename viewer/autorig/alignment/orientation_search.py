@@ -153,7 +153,10 @@ def judge(template: Side, target: Side, similarity: Similarity) -> Candidate:
 
 def _thinned(side: Cloud, count: int) -> Cloud:
     step = max(1, len(side.samples.positions) // count)
-    samples = SurfaceSamples(side.samples.positions[::step], side.samples.normals[::step])
+    every = side.samples
+    samples = SurfaceSamples(
+        every.positions[::step], every.normals[::step], every.triangles[::step]
+    )
     return side.with_samples(samples)
 
 

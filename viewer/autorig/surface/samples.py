@@ -19,10 +19,13 @@ class SurfaceSamples:
     """(N, 3). The mesh's unit."""
     normals: Floats
     """(N, 3). Unit normals of the triangles on which they lie."""
+    triangles: Ints
+    """(N,). Those triangles."""
 
     def __post_init__(self) -> None:
         freeze_fields(self, positions=(None, 3))
         freeze_fields(self, normals=(len(self.positions), 3))
+        freeze_fields(self, np.int32, triangles=(len(self.positions),))
 
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
@@ -45,6 +48,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     return SurfaceSamples(
         np.einsum("nk,nka->na", weights, corners),
         triangle_normals(positions, triangles[chosen]),
+        chosen,
     )
 
 
@@ -60,4 +64,4 @@ def _even_triangles(positions: Floats, triangles: Ints, count: int) -> Ints:
     if len(areas) == 0 or not total[-1] > 0.0:
         raise RigError("expected a mesh with an area to align, found none")
     places = (np.arange(count) + 0.5) / count * total[-1]
-    return np.minimum(np.searchsorted(total, places), len(areas) - 1)
+    return np.minimum(np.searchsorted(total, places), len(areas) - 1).astype(np.int32)

@@ -11,12 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.topology import Indices, components, welded
+from viewer.rigs.mesh import triangle_areas
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
 # less.
 _NEAR = 1e-4
+# Of an island that does not bend: length of the edges that span it, relative to the diagonal of its
+# box (0.58 for the sides of a cube), and fraction of its area in triangles with such an edge. The
+# longest part of a leg of three parts has less than half of the area.
+_SPANS, _STIFF = 0.5, 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -75,6 +80,24 @@ def one_sided(mesh: Welded) -> Welded:
 def islands(n_vertices: int, triangles: Ints) -> Ints:
     """Return each vertex's connected component (V,), numbered in the order of first vertices."""
     return _labels(n_vertices, edges(triangles))
+
+
+def stiff_islands(mesh: Welded) -> Bools:
+    """Return the islands that do not bend, as boxes and rods: (I,).
+
+    Most of their surface spans them from end to end, without vertices in between: a joint in the
+    middle would shear them.
+    """
+    low, high = np.full((mesh.n_islands, 3), np.inf), np.full((mesh.n_islands, 3), -np.inf)
+    np.minimum.at(low, mesh.islands, mesh.positions)
+    np.maximum.at(high, mesh.islands, mesh.positions)
+    corners, owners = mesh.positions[mesh.triangles], mesh.islands[mesh.triangles[:, 0]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    spans = sides >= _SPANS * np.linalg.norm(high - low, axis=1)[owners]
+    areas = triangle_areas(mesh.positions, mesh.triangles)
+    spanned = np.bincount(owners, areas * spans, mesh.n_islands)
+    found: Bools = spanned > _STIFF * np.bincount(owners, areas, mesh.n_islands)
+    return found
 
 
 def edges(triangles: Ints) -> Ints:

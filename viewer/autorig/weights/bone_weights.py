@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from viewer.autorig.solid import Solid
 from viewer.autorig.surface.laplacian import laplacian
-from viewer.autorig.surface.welding import Welded
+from viewer.autorig.surface.samples import sample_surface
+from viewer.autorig.surface.welding import Welded, stiff_islands
 from viewer.autorig.weights.weight_transfer import conjugate_gradients, factorised, scaled_rows
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
@@ -23,6 +24,7 @@ from viewer.progress import part_of_work, report, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.memo import Memo
+from viewer.rigs.mesh import triangle_areas
 from viewer.rigs.retargeting.joint_names import name_tokens
 from viewer.rigs.skeleton import Skeleton, shown_joints, shown_parents
 
@@ -61,6 +63,10 @@ and lengths of paths (W,) from the voxels of each bone."""
 
 # Parts.
 _RIGID = 0.8  # fraction of a part's vertices that are nearest to one joint, so that it is rigid
+# The same of the area of a part that cannot bend in the middle: two bones that share it evenly
+# would shear it.
+_MOSTLY = 0.6
+_SAMPLES = 20_000  # of the surface of all such parts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -256,7 +262,8 @@ def bone_heat(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
         report_fraction(0.6 + 0.4 * start / right.shape[1], "spreading heat")
         values = solve(right[:, start : start + step].toarray())
         parts.append(sparse.csc_array(np.where(values < _LEAST, 0.0, values)))
-    return _finished(mesh, sparse.csr_array(sparse.hstack(parts)), nearest, distances)
+    found = sparse.csr_array(sparse.hstack(parts))
+    return _finished(mesh, found, nearest, distances, _stiff_votes(mesh, solid, bones))
 
 
 def geodesic_voxels(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
@@ -294,7 +301,7 @@ def geodesic_voxels(mesh: Welded, solid: Solid, bones: Bones) -> BoneWeights:
     columns = np.array(joints, dtype=np.int32)
     weights = sparse.csr_array((found.data, columns[found.indices], found.indptr), shape=shape)
     nearest = columns[lengths.argmin(axis=1)]
-    return _finished(mesh, weights, nearest, distances)
+    return _finished(mesh, weights, nearest, distances, _stiff_votes(mesh, solid, bones))
 
 
 def _seen(points: Floats, solid: Solid, bones: Bones) -> tuple[csr_array, Floats]:
@@ -381,8 +388,30 @@ def _unit_rows(rows: csr_array, where: NDArray[np.integer], joints: Ints) -> csr
     return sparse.csr_array(rows + added)
 
 
-def _finished(mesh: Welded, rows: csr_array, nearest: Ints, distances: Floats) -> BoneWeights:
-    """Return normalised weights, with parts of mostly one joint moving rigidly."""
+def _stiff_votes(mesh: Welded, solid: Solid, bones: Bones) -> Floats:
+    """Return the fraction of the area of each stiff island that is nearest to each joint: (I, J).
+
+    Its few vertices are at its ends, where other bones begin. Rows of other islands are 0.
+    """
+    owners = mesh.islands[mesh.triangles[:, 0]]
+    triangles = mesh.triangles[stiff_islands(mesh)[owners]]
+    votes = np.zeros((mesh.n_islands, len(bones.starts) - 1))
+    if len(triangles) == 0 or not triangle_areas(mesh.positions, triangles).any():
+        return votes
+    samples = sample_surface(mesh.positions, triangles, _SAMPLES)
+    where = mesh.islands[triangles[samples.triangles, 0]]
+    joints, _ = _nearest_through(solid, bones, samples.positions)
+    np.add.at(votes, (where, joints), 1.0)
+    return votes / np.maximum(votes.sum(axis=1, keepdims=True), 1.0)
+
+
+def _finished(
+    mesh: Welded, rows: csr_array, nearest: Ints, distances: Floats, stiff: Floats
+) -> BoneWeights:
+    """Return normalised weights, with parts of mostly one joint moving rigidly.
+
+    ``stiff`` (I, J): fractions of the islands that do not bend, where these are known.
+    """
     from scipy import sparse
 
     # Eyes, buttons, armour and the plates of robots are separate surfaces that do not bend.
@@ -394,8 +423,12 @@ def _finished(mesh: Welded, rows: csr_array, nearest: Ints, distances: Floats) -
     members = np.bincount(mesh.islands, minlength=mesh.n_islands)
     joint = np.asarray(votes.argmax(axis=1)).ravel().astype(np.int32)
     share = np.asarray(votes.max(axis=1).toarray()).ravel() / np.maximum(members, 1)
-    is_rigid = share >= _RIGID
-    is_rigid[members.argmax()] = False  # the body itself, which may be one long bone
+    known = stiff.max(axis=1) > 0.0
+    joint = np.where(known, stiff.argmax(axis=1), joint).astype(np.int32)
+    share = np.where(known, stiff.max(axis=1), share)
+    is_rigid = share >= np.where(known, _MOSTLY, _RIGID)
+    # The body itself may be one long bone.
+    is_rigid[members.argmax()] &= known[members.argmax()]
     rigid = np.where(is_rigid, joint, -1).astype(np.int32)
     where = np.flatnonzero(is_rigid[mesh.islands])
     kept = scaled_rows(rows, np.where(is_rigid[mesh.islands], 0.0, 1.0))
