@@ -1,10 +1,18 @@
-"""Rigs from the bundled templates, compared with the artists' rigs of the same meshes.
+"""Rigs made with default settings, compared with the artists' rigs of the same meshes.
 
-Measured by ``evaluate_rig.py`` on the characters beside it, ``../shared/data/rigging``, with
-default settings: distance of 14 joints with a common meaning (mean and largest), L1 distance of
-weights by body part, same dominant part, mean distance of vertices in five poses; all lengths as
-percentages of the longest side. Quadrupeds take the fox as template. Names select characters;
-``--sheets FOLDER`` draws the five poses of each, the artist's above ours.
+Prints Markdown tables like those of ``../shared/research/rigging.md``, for the characters in
+``../shared/data/rigging``. All lengths are percentages of the longest side, times are processor
+seconds. Names select characters; ``--sheets FOLDER`` draws five poses of each, the artist's above
+ours.
+
+- Humanoids and quadrupeds, rigged from the bundled body and fox, measured by ``evaluate_rig.py``:
+  distance of joints with a common meaning, L1 distance of weights by body part, same dominant part,
+  distance of vertices in five poses; and the last on the artist's joints, bound by ``heat`` and
+  ``voxel``.
+- Other shapes, with ``--auto``: distance of each joint from the nearest one of the other skeleton
+  (CD-J2J), fraction of the joints with a counterpart within 5 % (IoU), and the deformation: the
+  artist's joints are rotated at random, our rig is posed as similarly as it can be, and the rest is
+  measured. How far the poses move the vertices is beside it.
 """
 
 import argparse
@@ -13,12 +21,14 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bench_binding import CHARACTERS, truth_of
+from bench_binding import CHARACTERS, bound, parts_of, truth_of
 from scipy import sparse
+from scipy.spatial.transform import Rotation
 
 import viewer
 from viewer.autorig.confidence import confidence
 from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import BINDING
 from viewer.errors import RigError
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.media.image import save_image
@@ -32,6 +42,28 @@ from viewer.rigs.skinning import joint_matrices
 # Of the joint error (median of humanoids, mean of quadrupeds) and the mean deformation, percent of
 # the longest side.
 HUMANOID_GOALS, QUADRUPED_GOAL = {"joint": 3.0, "deformation": 1.5}, 4.0
+SHAPE_GOALS = {"joint": 5.0, "deformation": 2.0}
+"""CD-J2J and mean deformation, percent of the longest side."""
+SHAPES = "spider", "snake", "bird"
+"""Words in the names of the ``.glb`` files of other shapes."""
+
+BINDINGS = " / ".join(BINDING) + " on true joints"
+HUMANOID_TABLE = (
+    f"| humanoid, template `body` | vertices | joint / deformation | largest joint error | L1 | "
+    f"dom % | {BINDINGS} | confidence | CPU s |\n" + "|---" * 9 + "|"
+)
+QUADRUPED_TABLE = (
+    f"| quadruped, template `fox` | vertices | joint % mean/max | CD-J2J | IoU@5% | L1 | dom % | "
+    f"def mean/p95 | {BINDINGS} | confidence | CPU s |\n" + "|---" * 11 + "|"
+)
+SHAPE_TABLE = (
+    "| other shape, `--auto` | vertices | joints ours / artist's | CD-J2J | IoU@5% | deformation | "
+    "of | CPU s |\n" + "|---" * 8 + "|"
+)
+
+# Random poses of other shapes: their number, rotation of each joint about each axis in radians
+# (22 degrees in all), vertices that are fitted, steps, and how much a rotation costs.
+_POSES, _TURN, _FITTED, _STEPS, _DAMPING = 4, 0.22, 2500, 8, 1e-6
 _GAP = 1.1  # distance between the poses of a sheet, relative to the figure's size
 
 
@@ -46,41 +78,206 @@ def main() -> None:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--sheets", type=Path)
     given = parser.parse_args()
-    templates = {
-        is_quadruped: load(*files).actors[0].figure
-        for is_quadruped, files in ((False, [bundled_body()]), (True, bundled_files()))
+    templates = {False: load(bundled_body()), True: load(*bundled_files())}
+    paths = {path.stem: path for path in sorted(CHARACTERS.glob("*.npz"))}
+    truths = {
+        name: truth_of(evaluate_rig, path)
+        for name, path in paths.items()
+        if name in (given.names or paths)
     }
-    found: dict[bool, list[dict[str, float]]] = {False: [], True: []}
-    refused = []
-    for path in sorted(CHARACTERS.glob("*.npz")):
-        truth = truth_of(evaluate_rig, path) if path.stem in (given.names or [path.stem]) else None
-        if truth is None:
-            continue
-        is_quadruped = "fup_l" in truth["sem"]
-        start = time.process_time()
-        try:
-            rig = rigged(evaluate_rig, truth, templates[is_quadruped], is_quadruped)
-        except RigError as problem:
-            refused.append(path.stem)
-            print(f"  {path.stem:<14} refused: {problem}")
-            continue
-        taken = time.process_time() - start
-        score = evaluate_rig.compare(truth, rig, is_quadruped)
-        found[is_quadruped].append(score)
-        print(
-            f"  {path.stem:<14} {len(truth['V']):6} vertices   joints {score['joint_mean']:.1f} "
-            f"(most {score['joint_max']:.1f}, {score['joint_worst']})   L1 {score['l1']:.2f}   "
-            f"same part {score['dom']:.0f} %   deformation {score['def_mean']:.2f}   "
-            f"confidence {rig['confidence']:.2f}   {taken:.1f} s",
-            flush=True,
-        )
-        if given.sheets is not None:
-            given.sheets.mkdir(parents=True, exist_ok=True)
-            save_image(given.sheets / f"{path.stem}.png", _sheet(evaluate_rig, truth, rig))
-    for is_quadruped, scores in found.items():
+    refused: list[str] = []
+    for is_quadruped, scene in templates.items():
+        names = [
+            name
+            for name, truth in truths.items()
+            if truth is not None and is_quadruped == ("fup_l" in truth["sem"])
+        ]
+        scores: list[dict[str, float]] = []
+        if names:
+            print("\n" + (QUADRUPED_TABLE if is_quadruped else HUMANOID_TABLE), flush=True)
+        for name in names:
+            truth, start = truths[name], time.process_time()
+            try:
+                rig = rigged(evaluate_rig, truth, scene.actors[0].figure, is_quadruped)
+            except RigError as problem:
+                refused.append(name)
+                print(f"| {name} | {len(truth['V'])} | refused: {problem} |", flush=True)
+                continue
+            taken = time.process_time() - start
+            scores.append(evaluate_rig.compare(truth, rig, is_quadruped))
+            row = _row(scores[-1], is_quadruped, _on_true_joints(evaluate_rig, truth, paths[name]))
+            cells = name, len(truth["V"]), *row, f"{rig['confidence']:.2f}", f"{taken:.1f}"
+            print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+            if given.sheets is not None:
+                given.sheets.mkdir(parents=True, exist_ok=True)
+                save_image(given.sheets / f"{name}.png", _sheet(evaluate_rig, truth, rig))
         if scores:
             _summarise(scores, is_quadruped)
-    print(f"refused: {', '.join(refused) or 'none'}")
+    others = {name: path for name, path in paths.items() if truths.get(name, ...) is None}
+    others |= {path.stem: path for path in sorted((CHARACTERS / "animated").glob("*.glb"))}
+    _print_shapes(evaluate_rig, {n: p for n, p in others.items() if n in (given.names or others)})
+    print(f"\nrefused: {', '.join(refused) or 'none'}")
+
+
+def _row(score: dict[str, float], is_quadruped: bool, bound_alike: str) -> tuple[str, ...]:
+    """Return the cells of a character."""
+    parts = f"{score['l1']:.2f}", f"{score['dom']:.0f}"
+    if is_quadruped:
+        return (
+            f"{score['joint_mean']:.1f} / {score['joint_max']:.1f}",
+            f"{score['cd']:.1f}",
+            f"{score['iou']:.2f}",
+            *parts,
+            f"{score['def_mean']:.2f} / {score['def_p95']:.1f}",
+            bound_alike,
+        )
+    whole = f"{score['joint_mean']:.1f} / {score['def_mean']:.1f} (p95 {score['def_p95']:.1f})"
+    worst = f"{score['joint_max']:.1f} {score['joint_worst']}"
+    return whole, worst, *parts, bound_alike
+
+
+def _on_true_joints(evaluate_rig, truth, path: Path) -> str:
+    """Return the deformations of both binding methods on the artist's joints."""
+    skeleton, mesh, order = parts_of(truth, np.load(path)["parents"])
+    found = []
+    for method in BINDING:
+        weights = bound(skeleton, mesh, method)[0][:, np.argsort(order)]
+        score = evaluate_rig.compare(truth, {**truth, "W": weights}, "fup_l" in truth["sem"])
+        found.append(f"{score['def_mean']:.2f}")
+    return " / ".join(found)
+
+
+def _print_shapes(evaluate_rig, shapes: dict[str, Path]) -> None:
+    """Print the table of skeletons that are found in the mesh."""
+    found = []
+    for name, path in shapes.items():
+        truth = _shape_of(path)
+        if truth is None:
+            continue
+        if not found:
+            print("\n" + SHAPE_TABLE)
+        triangles, start = truth["F"].astype(np.int32), time.process_time()
+        mesh = Mesh(truth["V"], vertex_normals(truth["V"], triangles), triangles)
+        try:
+            scene = viewer.rig(Actor(Figure(name, mesh)), auto=True)
+        except RigError as problem:
+            print(f"| {name} | {len(truth['V'])} | refused: {problem} |", flush=True)
+            continue
+        taken = time.process_time() - start
+        (actor,) = scene.actors
+        places = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+        parents = np.array(actor.figure.skeleton.parents)
+        weights = _weights_of(actor.figure.skin)
+        live = [each["J"][each["W"].sum(axis=0) > 1e-6] for each in
+                (truth, {"J": places, "W": weights})]  # fmt: skip
+        size = float(np.ptp(truth["V"], axis=0).max())
+        distance = evaluate_rig.cdj2j(*live, size)
+        left, moved = left_of_poses(evaluate_rig, truth, (places, parents, weights))
+        found.append((distance, left))
+        cells = (
+            name, len(truth["V"]), f"{len(places)} / {len(truth['J'])}", f"{distance:.1f}",
+            f"{evaluate_rig.iou(*live, size):.2f}", f"{left:.2f}", f"{moved:.1f}", f"{taken:.1f}",
+        )  # fmt: skip
+        print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+    if found:
+        distance, left = np.mean(found, axis=0)
+        print(
+            f"\nother shapes: mean CD-J2J {distance:.1f} % (goal: {SHAPE_GOALS['joint']:g}), mean "
+            f"deformation {left:.2f} % (goal: {SHAPE_GOALS['deformation']:g})"
+        )
+
+
+def _shape_of(path: Path):
+    """Return the artist's mesh and rig in a file; None for a person or a quadruped."""
+    if path.suffix == ".npz":
+        stored = np.load(path)
+        weights = np.zeros((len(stored["V"]), len(stored["J"])))
+        rows = np.arange(len(weights))[:, None]
+        np.add.at(weights, (rows, stored["joints"].astype(int)), stored["weights"])
+        return {**{key: stored[key] for key in ("V", "F", "J", "parents")}, "W": weights}
+    if not any(word in path.stem for word in SHAPES):
+        return None
+    figure = load(path).actors[0].figure
+    places = np.linalg.inv(figure.skin.inverse_bind)[:, :3, 3]
+    return {
+        "V": figure.mesh.positions,
+        "F": figure.mesh.triangles,
+        "J": places,
+        "parents": np.array(figure.skeleton.parents),
+        "W": _weights_of(figure.skin),
+    }
+
+
+def _weights_of(skin) -> np.ndarray:
+    shape = (skin.n_vertices, skin.n_joints)
+    return sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape).toarray()
+
+
+def left_of_poses(evaluate_rig, truth, rig) -> tuple[float, float]:
+    """Return how far the best pose of a rig is from random poses of the artist's, and these from
+    the mesh at rest, as percentages of the longest side.
+
+    ``rig``: joint positions (J, 3), parents (J,) and weights (V, J).
+    """
+    random, middle = np.random.default_rng(0), truth["V"].mean(axis=0)
+    positions, size = truth["V"] - middle, float(np.ptp(truth["V"], axis=0).max())
+    chosen = random.permutation(len(positions))[:_FITTED]
+    places, parents, weights = rig
+    left, moved = [], []
+    for _ in range(_POSES):
+        turns = {
+            joint: Rotation.from_rotvec(random.normal(0.0, _TURN, 3)).as_matrix()
+            for joint in np.flatnonzero(truth["parents"] >= 0)
+        }
+        worlds = evaluate_rig.globals_(truth["J"] - middle, truth["parents"], turns)
+        goal = evaluate_rig.lbs(positions[chosen], truth["W"][chosen], worlds)
+        fitted = _best_pose(positions[chosen], goal, places - middle, parents, weights[chosen])
+        left.append(np.linalg.norm(fitted - goal, axis=1).mean())
+        moved.append(np.linalg.norm(positions[chosen] - goal, axis=1).mean())
+    return 100.0 * float(np.mean(left)) / size, 100.0 * float(np.mean(moved)) / size
+
+
+def _best_pose(rest, goal, places, parents, weights) -> np.ndarray:
+    """Return the vertices (V, 3) of the pose of a rig that is nearest to a goal.
+
+    Gauss-Newton steps over the rotations of all joints and the translation of the root, from rest.
+    """
+    count = len(places)
+    above = np.eye(count, dtype=bool)  # whether a joint is below another one, or the same
+    for joint in np.flatnonzero(parents >= 0):
+        above[joint] |= above[parents[joint]]
+    turns, shift = np.tile(np.eye(3), (count, 1, 1)), (goal - rest).mean(axis=0)
+    damping = _DAMPING * len(rest) * float(np.ptp(rest, axis=0).max()) ** 2
+    best, least = rest + shift, np.inf
+    for _ in range(_STEPS):
+        origins = np.empty_like(places)
+        for joint, parent in enumerate(parents):
+            offset = places[joint] + shift
+            if parent >= 0:
+                offset = origins[parent] + turns[parent] @ (places[joint] - places[parent])
+            origins[joint] = offset
+        each = np.einsum("jab,vjb->vja", turns, rest[:, None] - places) + origins
+        posed = np.einsum("vj,vja->va", weights, each)
+        error = float(np.linalg.norm(goal - posed, axis=1).mean())
+        if error < least:
+            best, least = posed, error
+        # Rotating joint k by w moves a vertex by w x sum of its weights below k times its place
+        # relative to k.
+        total = weights @ above
+        arms = np.einsum("vja,jk->vka", weights[:, :, None] * each, above.astype(float))
+        arms -= total[:, :, None] * origins
+        slopes = np.zeros((len(rest), 3, 3 * count + 3))
+        for axis in range(3):
+            turned = np.cross(np.eye(3)[axis], arms)
+            slopes[:, :, axis : 3 * count : 3] = turned.transpose(0, 2, 1)
+            slopes[:, axis, 3 * count + axis] = 1.0
+        slopes = slopes.reshape(-1, 3 * count + 3)
+        matrix = slopes.T @ slopes + damping * np.eye(3 * count + 3)
+        step = np.linalg.solve(matrix, slopes.T @ (goal - posed).ravel())
+        shift = shift + step[3 * count :]
+        added = Rotation.from_rotvec(above @ step[: 3 * count].reshape(count, 3)).as_matrix()
+        turns = added @ turns
+    return best
 
 
 def _summarise(scores: list[dict[str, float]], is_quadruped: bool) -> None:
@@ -89,12 +286,12 @@ def _summarise(scores: list[dict[str, float]], is_quadruped: bool) -> None:
     below = f"below 6 %: {np.mean(joints < 6.0):.0%}"
     if is_quadruped:
         print(
-            f"quadrupeds: mean joint error {joints.mean():.2f} % (goal: {QUADRUPED_GOAL}), "
+            f"\nquadrupeds: mean joint error {joints.mean():.2f} % (goal: {QUADRUPED_GOAL}), "
             f"{below}; mean deformation {deformation:.2f} %"
         )
         return
     print(
-        f"humanoids: median joint error {np.median(joints):.2f} % (goal: "
+        f"\nhumanoids: median joint error {np.median(joints):.2f} % (goal: "
         f"{HUMANOID_GOALS['joint']}), {below} (goal: 90%); mean deformation {deformation:.2f} % "
         f"(goal: {HUMANOID_GOALS['deformation']})"
     )
@@ -106,10 +303,8 @@ def rigged(evaluate_rig, truth, template: Figure, is_quadruped: bool):
     mesh = Mesh(truth["V"], vertex_normals(truth["V"], triangles), triangles)
     result = transfer(template, rest_pose(template.skeleton), mesh)
     skin, skeleton = result.figure.skin, result.figure.skeleton
-    shape = (skin.n_vertices, skin.n_joints)
-    weights = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape).toarray()
     return {
-        "W": weights,
+        "W": _weights_of(skin),
         "J": joint_matrices(result.figure, result.pose)[:, :3, 3],
         "parents": np.array(skeleton.parents),
         "sem": evaluate_rig.mapping("rfox" if is_quadruped else "body", list(skeleton.names)),
