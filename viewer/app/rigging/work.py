@@ -32,7 +32,7 @@ from viewer.app.rigging.rigging import (
     template_files,
 )
 from viewer.autorig.alignment.anatomy_fit import left_of
-from viewer.autorig.alignment.orientation_search import AXES, axis_direction
+from viewer.autorig.alignment.orientation_search import axis_direction, nearest_axis
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.alignment.surface_alignment import (
@@ -359,15 +359,12 @@ def fit_again(
     ahead = np.cross(left_of(figure, pose), up)
     marks = np.array([[own[name], places[name]] for name in held])
     # The present joints show which way the target faces.
-    how = AlignmentSettings(up=_axis(turn @ up), facing=_axis(turn @ ahead), landmarks=marks)
+    how = AlignmentSettings(
+        up=nearest_axis(turn @ up), facing=nearest_axis(turn @ ahead), landmarks=marks
+    )
     found = align_posed(figure, pose, target, how, fits=True)
     joints = joint_matrices(found.figure, found.pose)[:, :3, 3]
     return dict(zip(names, found.alignment.similarity.apply(joints), strict=True))
-
-
-def _axis(way: Floats) -> str:
-    """Return the axis nearest to a direction (3,)."""
-    return max(AXES, key=lambda name: float(way @ axis_direction(name)))
 
 
 def start_match(state: AppState) -> None:

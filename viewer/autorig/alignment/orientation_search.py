@@ -48,6 +48,11 @@ def axis_direction(name: str) -> Floats:
     return direction
 
 
+def nearest_axis(way: Floats) -> str:
+    """Return the axis nearest to a direction (3,)."""
+    return max(AXES, key=lambda name: float(way @ axis_direction(name)))
+
+
 def stated_front(template_up: str) -> str:
     """Return the axis that counts as the front of a template: +z if y is up, +x if z is up."""
     return "z" if template_up == "y" else "x"
