@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from rigs.retargeting.hanging_arms import N, body, motion
-from rigs.retargeting.rest_twins import NAMES, Y, t_pose, worlds, written
+from rigs.retargeting.rest_twins import NAMES, Y, Z, t_pose, worlds, written
 from rigs.retargeting.two_people import places
 
 from viewer.rigs.blendshapes import BlendShapes
@@ -112,33 +112,91 @@ def test_hands_that_clap_meet_in_a_figure_with_long_arms():
     assert wrong[0] > 0.12 and wrong[1] < 0.0251
 
 
-@pytest.mark.parametrize("is_shaped", [False, True])
-def test_hands_stay_outside_of_a_stout_body(is_shaped):
-    # A ring of vertices 22 cm around each thigh, all bound to the thigh; of a shaped body, at rest
-    # 0.2 cm, and wider in the shape of the motion.
+def test_hands_on_the_crown_stay_there_in_a_figure_with_long_arms():
+    # Wrists of the source at (8, 186), 41 cm above the shoulders; by the law of cosines for an
+    # upper arm of 28 cm and a forearm of 26.
+    wrist, shoulder = np.array([8.0, 186.0]), np.array([18.0, 145.0])
+    line = wrist - shoulder
+    length = np.linalg.norm(line)
+    cosine = (28.0**2 + length**2 - 26.0**2) / (2.0 * 28.0 * length)
+    upper = np.arctan2(line[1], line[0]) - np.arccos(cosine)
+    elbow = shoulder + 28.0 * np.array([np.cos(upper), np.sin(upper)])
+    lower = np.arctan2(*(wrist - elbow)[::-1]) - upper
+    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        local[:, NAMES.index(f"{side}Arm")] = matrices(sign * upper * Z)
+        local[:, NAMES.index(f"{side}ForeArm")] = matrices(sign * lower * Z)
+    source = written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    figure = body(arms=1.4)
+    found, clip, _ = kept(figure, source)
+    before, after = (places(figure, each)["LeftHand_"][:, :2] for each in (found.clip, clip))
+    # Arms that are 1.4 times as long end 0.4 * 42 cm higher; 2.5 % of 137 cm are left.
+    assert_allclose(np.linalg.norm(before - wrist, axis=1), 0.4 * length, atol=1e-6)
+    assert np.linalg.norm(after - wrist, axis=1).max() < 0.0255 * HEIGHT
+
+
+RADIUS = 22.0  # of stout thighs
+TIP = 2.0  # distance of the corners of a hand from its wrist
+
+
+def stout_figure(radius=RADIUS):
+    """Return a person with tubes around the thighs, and octahedra around the wrists as hands."""
     figure = body(width=1.5)
-    names = list(figure.skeleton.names)
-    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    ring = 22.0 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
-    sides = ("Left", "Right")
-    positions = np.concatenate([ring + np.array([15.0 * s, 75.0, 0.0]) for s in (1, -1)])
-    rows = [[(names.index(f"{side}UpLeg_"), 1.0)] for side in sides for _ in angle]
+    names, at = list(figure.skeleton.names), places_at_rest(figure)
+    angle = np.arange(24) * 2.0 * np.pi / 24.0
+    ring = radius * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+    ahead = np.roll(np.arange(24), -1)
+    points, triangles, rows = [], [], []
+
+    def add(joint, corners, faces):
+        triangles.append(np.array(faces) + sum(map(len, points)))
+        points.append(corners)
+        rows.extend([[(names.index(joint), 1.0)]] * len(corners))
+
+    for side in ("Left", "Right"):
+        tube = np.concatenate([ring + at[f"{side}UpLeg_"], ring + at[f"{side}Leg_"]])
+        i = np.arange(24)
+        faces = [[i, ahead, i + 24], [ahead, ahead + 24, i + 24]]
+        add(f"{side}UpLeg_", tube, np.concatenate([np.stack(each, axis=1) for each in faces]))
+        tips = TIP * np.concatenate([np.eye(3), -np.eye(3)]) + at[f"{side}Hand_"]
+        signs = [(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)]
+        # Counter-clockwise from outside: an even number of negative corners keeps x, y, z in order.
+        faces = [f if sum(k > 2 for k in f) % 2 == 0 else f[::-1] for f in signs]
+        add(f"{side}Hand_", tips, faces)
     bind = np.tile(np.eye(4), (len(names), 1, 1))
-    mesh = Mesh(positions, 0.0 * positions, np.arange(24, dtype=np.int32).reshape(-1, 3))
-    stout = replace(figure, mesh=mesh, skin=skin_from_lists(rows, bind))
+    bind[:, :3, 3] = -np.array([at[name] for name in names])
+    positions = np.concatenate(points)
+    mesh = Mesh(positions, 0.0 * positions, np.concatenate(triangles).astype(np.int32))
+    return replace(figure, mesh=mesh, skin=skin_from_lists(rows, bind))
+
+
+@pytest.mark.parametrize("is_shaped", [False, True])
+def test_hands_are_moved_out_of_a_stout_body(is_shaped):
+    # The thighs of a shaped body are thin at rest, and stout in the shape of the motion.
+    stout = stout_figure()
     if is_shaped:
-        thin = replace(mesh, positions=positions - 0.99 * np.concatenate([ring, ring]))
-        wider = BlendShapes(("wide",), (positions - thin.positions)[None])
+        thin = stout_figure(0.1).mesh
+        wider = BlendShapes(("wide",), (stout.mesh.positions - thin.positions)[None])
         stout = replace(stout, mesh=thin, blend_shapes=wider)
     source = motion(0.3, 0.2)
     found = retarget(source, stout, source_rest="auto")
     driven = replace(found.clip, shape_weights=np.ones((N, 1))) if is_shaped else found.clip
-    clip, _ = keep_hands(found, driven, stout)
-    before = np.linalg.norm(from_thigh(places(stout, found.clip)), axis=1)
-    after = np.linalg.norm(from_thigh(places(stout, clip)), axis=1)
-    # The trunk, which has no skin here, attracts hands by 0.4 cm; without the skin of the thighs,
-    # they would be 2.4 cm nearer.
-    assert (after >= np.minimum(before, 22.0) - 0.5).all()
+    clip, changes = keep_hands(found, driven, stout)
+    for side in ("Left", "Right"):
+        before, after = (from_thigh(places(stout, each), side) for each in (found.clip, clip))
+        depths = [RADIUS - np.linalg.norm(each, axis=1) for each in (before, after)]
+        # A corner is farther from the wrist than a face, TIP / sqrt(3), in every direction. Smooth
+        # paths leave less than 1 % of the height.
+        assert depths[0].max() + TIP > 4.0 and depths[1].max() + TIP / np.sqrt(3.0) < 1.4
+        # The way out begins and ends within 3 frames: without smoothing, up to 9 cm in one.
+        paths = [places(stout, each)[f"{side}Hand_"] for each in (found.clip, clip)]
+        shaken = np.linalg.norm(np.diff(paths[1] - paths[0], n=2, axis=0), axis=1)
+        assert shaken.max() < 0.5
+        feet = [places(stout, each)[f"{side}Foot_"] for each in (found.clip, clip)]
+        assert_allclose(*feet, atol=1e-9)
+    notes = [str(note) for note in hand_notes(changes, found, replace(stout, unit="cm"))]
+    (text,) = [note for note in notes if "moved out" in note]
+    assert "--hand-contact off disables this" in text
 
 
 def test_distance_that_short_arms_cannot_reach_is_reported():

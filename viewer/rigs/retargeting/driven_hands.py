@@ -2,8 +2,9 @@
 
 Retargeting preserves the directions of limbs, so hands that rest on a hip, touch the head or clap
 miss if proportions differ. Near a part of the body, a wrist gets the place relative to that part
-that it has in the source, scaled by the height; elbow and shoulder follow. Hands of long arms stay
-above the ground if those of the source do.
+that it has in the source, scaled by the height; elbow and shoulder follow. Hands that are then
+inside the skin of the body, or of the other hand, are moved out. Hands of long arms stay above the
+ground if those of the source do.
 """
 
 from __future__ import annotations
@@ -17,16 +18,25 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import Remedy
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.cleanup.frames import in_frame_order
-from viewer.rigs.feet.body import chain_worlds, chains_to, is_solvable, rest_worlds, shape_of
+from viewer.rigs.feet.body import (
+    chain_worlds,
+    chains_to,
+    is_solvable,
+    rest_worlds,
+    shape_of,
+    spans_of,
+)
 from viewer.rigs.feet.curves import falling
 from viewer.rigs.feet.legs import Leg, leg_rotations
 from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.geometry.vectors import axis_vector, unit
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.retarget import Retargeted
 from viewer.rigs.scalars import length_text
 from viewer.rigs.shape import rest_joints, shaped
@@ -35,7 +45,7 @@ from viewer.rigs.skin import owners, strongest_influences
 
 # Parts of the body as chains of joints; the bones between those that are matched count.
 _PARTS = (
-    ("pelvis", "spine1", "spine2", "spine3", "neck", "head"),
+    ("pelvis", "spine1", "spine2", "spine3", "neck", "head", "crown"),
     ("left_hip", "left_knee"), ("right_hip", "right_knee"),
 )  # fmt: skip
 # The right side first: so elbows bend the other way than knees, see ``hinges``.
@@ -56,7 +66,21 @@ _TOGETHER, _APART = 0.08, 0.17  # the same for two wrists: 0.06 where hands clap
 _SLACK = 0.025
 _EXTENDED = 0.97  # maximum extension of an arm: its elbow is bent by 28 degrees
 _SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _SLACK
-_GIRTH = 75.0  # percentile of the distances of the skin from a bone that is taken as its radius
+# Height of the crown above the head's joint where nothing shows it: 0.11 to 0.2 for people, of whom
+# most files have the joint at the ears, some at the chin.
+_CROWN = 0.15
+
+# Points of the skin, between which a person has about 3 cm, and those of a hand that are kept
+# outside the others.
+_POINTS, _HAND_POINTS = 2000, 24
+_DEEP = 0.3  # depth up to which hands are moved out: more than half the width of a stout body
+# Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
+# edge of something thin, or of an open mesh, the nearest point is aside.
+_BEHIND = 0.5
+# Hands are moved out in rounds, each smoothed over that many seconds before and after a frame, so
+# that they begin to give way before they would enter the body: a tenth of a second is the time in
+# which a person's hand stops.
+_ROUNDS, _WIDTH = 8, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +95,8 @@ class KeptHands:
     """The same distance with straight arms: what is left because they are too short."""
     lifted: float = 0.0
     """Largest distance, in figure units, by which a hand was lifted to stay above the ground."""
+    moved_out: float = 0.0
+    """Largest distance, in figure units, by which a hand was moved out of the skin."""
 
 
 class _Body:
@@ -83,6 +109,7 @@ class _Body:
         joints: dict[str, int],
         rests: Floats,
         others: Iterable[int] = (),
+        crown: float | None = None,
     ) -> None:
         self.rests, self.chains = rests, chains_to(skeleton, [*joints.values(), *others])
         self.place = {name: int(self.chains.place[joint]) for name, joint in joints.items()}
@@ -94,10 +121,19 @@ class _Body:
         pelvis, neck, *leg = (self.rest[self.place[name], :3, 3] for name in ("pelvis", top, *_LEG))
         limb = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()
         self.height = float(np.linalg.norm(neck - pelvis) + limb)
+        # The crown is a point of the head, in the direction of the trunk at rest.
+        self.trunk = unit(neck - pelvis)
+        self._head = self.rest[self.place["head"]] if "head" in joints else None
+        if self._head is not None:
+            length = _CROWN * self.height if crown is None else crown
+            self._crown = np.linalg.pinv(self._head[:3, :3]) @ (length * self.trunk)
+            self.place["crown"] = self.place["head"]
 
     def at(self, name: str) -> Floats:
-        """Return the positions of a joint relative to the height: (N, 3)."""
-        return self.world[:, self.place[name], :3, 3] / self.height
+        """Return the positions of a joint, or the crown, relative to the height: (N, 3)."""
+        world = self.world[:, self.place[name]]
+        found = world[:, :3, 3] if name != "crown" else world[:, :3] @ np.append(self._crown, 1.0)
+        return found / self.height
 
 
 def keep_hands(
@@ -115,8 +151,10 @@ def keep_hands(
     weights = shape_of(figure, clip)
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     shape = shaped(figure, weights)
-    skin = _skin_of_ends(shape, mine)
-    body = _Body(skeleton, clip, mine, rests, () if skin is None else skin.movers)
+    skin, points = _skin_of_ends(shape, mine), _points_of(shape, mine)
+    movers = [*(() if skin is None else skin.movers), *(() if points is None else points.joints)]
+    crown = None if points is None else points.crown
+    body = _Body(skeleton, clip, mine, rests, movers, crown)
     theirs = {name: int(found.matches.partners[joint]) for name, joint in mine.items()}
     own_rests = np.stack([source.rest_translations, source.rest_scales])
     other = _Body(source, in_frame_order(found.source.clip), theirs, own_rests)
@@ -126,19 +164,24 @@ def keep_hands(
     )
     if not can_move:
         return given, None
-    radii = _radii(shape, mine, body.height)
-    shifts, nearness, together = _shifts(body, other, found.to_target, radii)
+    shifts, nearness, together = _shifts(body, other, found.to_target)
     before, least = (_error(each, nearness) for each in (shifts, _out_of_reach(body, shifts)))
+    touches = any((np.linalg.norm(shift, axis=1) > _SLACK).any() for shift in shifts)
+    # The proportions of the source are left alone: what its hands enter, it entered.
+    differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
     shifts = [
         _within_reach(body, arm, _beyond_slack(shift, slack))
         for arm, shift in zip(_ARMS, shifts, strict=True)
     ]
-    touches = any(shift.any() for shift in shifts)
     up = -axis_vector(figure.up) if hangs else axis_vector(figure.up)
+    given_way = np.zeros((len(_ARMS), *shifts[0].shape))
+    if points is not None and differs:
+        given_way = _ways_out(points, body, shifts, clip.timing)
+        shifts = [shift + each for shift, each in zip(shifts, given_way, strict=True)]
     lifts = _lifts(body, other, found, skin, up, shifts)
-    if not (touches or lifts.any()):
+    if not (any(shift.any() for shift in shifts) or lifts.any()):
         return given, None
     shifts = [shift + lift[:, None] * up for shift, lift in zip(shifts, lifts, strict=True)]
     joints = body.chains.joints
@@ -149,12 +192,15 @@ def keep_hands(
         np.zeros((len(rotations), 3)), [body.height * shift for shift in shifts],
     )  # fmt: skip
     kept = replace(clip, rotations=rotations)
-    reached = _Body(skeleton, kept, mine, rests)
-    wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    lifted = body.height * float(lifts.max())
+    farthest = (np.linalg.norm(given_way, axis=2).max(), lifts.max())
+    moved_out, lifted = (body.height * float(each) for each in farthest)
     if not touches:
-        return kept, KeptHands(0.0, 0.0, lifted=lifted)
-    return kept, KeptHands(before, _error(wished, nearness), least, lifted)
+        return kept, KeptHands(0.0, 0.0, lifted=lifted, moved_out=moved_out)
+    reached = _Body(skeleton, kept, mine, rests, crown=crown)
+    wished, _, _ = _shifts(reached, other, found.to_target)
+    # Where a hand was moved out of the skin, it should be outside.
+    missed = [shift + each for shift, each in zip(wished, given_way, strict=True)]
+    return kept, KeptHands(before, _error(missed, nearness), least, lifted, moved_out)
 
 
 def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
@@ -186,6 +232,16 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
                 least=100.0 * kept.least,
             )
         )
+    if kept.moved_out:
+        notes.append(
+            note(
+                "F007.hands-outside: hands of {figure} moved out of its body by up to {length}; "
+                "{remedy} disables this",
+                **called,
+                length=length_text(figure, kept.moved_out),
+                remedy=remedy,
+            )
+        )
     if kept.lifted:
         notes.append(
             note(
@@ -209,7 +265,7 @@ def _driven_joints(found: Retargeted) -> dict[str, int]:
 
 
 def _shifts(
-    body: _Body, other: _Body, to_target: Floats, radii: dict[str, float]
+    body: _Body, other: _Body, to_target: Floats
 ) -> tuple[list[Floats], list[Floats], Floats]:
     """Return how far the wrists should move, (N, 3) each, and how near they are to the body, (N,).
 
@@ -229,12 +285,8 @@ def _shifts(
             away = wrist - first - part[:, None] * bone
             distance = np.linalg.norm(away, axis=1)
             nearest = body.at(start) + part[:, None] * (body.at(end) - body.at(start))
-            # A stout body keeps the hand outside: no nearer than its skin, unless it is already.
-            outside = np.minimum(radii.get(start, 0.0), np.linalg.norm(own - nearest, axis=1))
-            longer = np.maximum(outside / np.maximum(distance, 1e-30), 1.0)
             weight = falling((distance - _NEAR) / (_FAR - _NEAR))
-            goal = nearest + longer[:, None] * away
-            total += weight[:, None] ** 2 * (goal - own)
+            total += weight[:, None] ** 2 * (nearest + away - own)
             weights += weight**2
             most = np.maximum(most, weight)
         shifts.append((most / np.maximum(weights, 1e-30))[:, None] * total)
@@ -329,20 +381,166 @@ def _error(shifts: list[Floats], nearness: list[Floats]) -> float:
     return float(lengths.sum() / max(np.concatenate(nearness).sum(), 1e-30))
 
 
-def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, float]:
-    """Return the distance of the skin from the bone that begins at each joint, if it has a skin."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _SkinPoints:
+    """Points spread evenly over the skin of a body, each of which moves with one joint."""
+
+    joints: Ints
+    """(P,) int32. The joints of the skeleton."""
+    places: Floats
+    normals: Floats
+    """(P, 3). Positions, and outward normals, in the space of the joints."""
+    arms: Ints
+    """(P,). 0 and 1 for points of the arms, as of ``_ARMS``, else -1."""
+    hands: Ints
+    """(P,). The same for hands."""
+    crown: float | None
+    """Height of the crown above the head's joint; None if the head has no skin."""
+
+
+def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
+    """Return points of a figure's skin; None if a hand has none."""
     mesh, skin = figure.mesh, figure.skin
-    if mesh is None or skin is None or not figure.is_attached:
-        return {}
-    vertices, strongest = owners(skin), strongest_influences(skin)
-    points, result = rest_joints(figure), {}
-    for start, end in _bones(joints):
-        own = vertices[strongest[skin.joints[strongest] == joints[start]]]
-        bone = points[joints[end]] - points[joints[start]]
-        length = float(np.linalg.norm(bone))
-        if not len(own) or length <= 0.0:
-            continue
-        away = mesh.positions[own] - points[joints[start]]
-        across = np.linalg.norm(np.cross(away, bone / length), axis=1)
-        result[start] = float(np.percentile(across, _GIRTH)) / height
+    if mesh is None or skin is None or not figure.is_attached or not mesh.n_triangles:
+        return None
+    corners = mesh.positions[mesh.triangles]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(crosses, axis=1)
+    if not areas.sum() > 0.0:
+        return None
+    # Equal areas lie between the points in the order of the triangles; within these, two powers of
+    # the plastic number spread them evenly (Roberts 2018).
+    steps = np.arange(_POINTS)
+    chosen = np.searchsorted(np.cumsum(areas), (steps + 0.5) / _POINTS * areas.sum())
+    chosen = chosen.clip(0, len(areas) - 1)
+    a, b = (steps * 0.7548776662466927) % 1.0, (steps * 0.5698402909980532) % 1.0
+    a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
+    factors = np.stack([1.0 - a - b, a, b], axis=1)
+    points = np.einsum("pk,pka->pa", factors, corners[chosen])
+    outward = np.sign(np.einsum("ta,ta->", corners[:, 0] - mesh.positions.mean(axis=0), crosses))
+    normals = (outward or 1.0) * unit(crosses[chosen])
+    # Each moves with the strongest joint of the nearest corner.
+    nearest = mesh.triangles[chosen, factors.argmax(axis=1)]
+    strongest = np.full(mesh.n_vertices, -1, dtype=np.int32)
+    influences = strongest_influences(skin)
+    strongest[owners(skin)[influences]] = skin.joints[influences]
+    movers = strongest[nearest]
+    is_bound = movers >= 0
+    movers, points, normals = movers[is_bound], points[is_bound], normals[is_bound]
+    parents = figure.require_skeleton().parents
+    rest = rest_joints(figure)
+    arms, hands = np.full((2, len(movers)), -1)
+    for number, arm in enumerate(_ARMS):
+        shoulder, elbow, wrist = (joints[name] for name in arm)
+        arms[descendants(parents, shoulder)[movers]] = number
+        # A hand is at most as long as its forearm; beyond it are things that it holds.
+        reach = np.linalg.norm(rest[wrist] - rest[elbow])
+        is_hand = descendants(parents, wrist)[movers]
+        hands[is_hand & (np.linalg.norm(points - rest[wrist], axis=1) < reach)] = number
+    if not {0, 1} <= set(hands.tolist()):
+        return None
+    crown = None
+    if "head" in joints:
+        own = descendants(parents, joints["head"])[movers]
+        top = next(joints[name] for name in _TOPS if name in joints)
+        trunk = unit(rest[top] - rest[joints["pelvis"]])
+        if own.any():
+            crown = float(np.quantile((points[own] - rest[joints["head"]]) @ trunk, 0.98))
+    bind = skin.inverse_bind[movers]
+    places = np.einsum("pab,pb->pa", bind[:, :3, :3], points) + bind[:, :3, 3]
+    normals = unit(np.einsum("pab,pb->pa", bind[:, :3, :3], normals))
+    return _SkinPoints(movers.astype(np.int32), places, normals, arms, hands, crown)
+
+
+def _ways_out(skin: _SkinPoints, body: _Body, shifts: list[Floats], timing: Timing) -> Floats:
+    """Return how far shifted wrists should move to keep hands outside the skin: (2, N, 3).
+
+    All lengths are relative to the height. Hands translate, as their world rotations stay.
+    """
+    result = np.zeros((len(_ARMS), *shifts[0].shape))
+    every = [np.flatnonzero(skin.hands == number).astype(np.int32) for number in range(len(_ARMS))]
+    chosen = [rows[_spread(skin.places[rows], _HAND_POINTS)] for rows in every]
+    # 1 for points that move with the other hand. The rest of its arm moves in another way.
+    with_other = [(skin.hands == 1 - number).astype(np.float64) for number in range(len(_ARMS))]
+    place = body.chains.place[skin.joints]
+
+    def posed(row: int, rows: Ints) -> tuple[Floats, Floats]:
+        """Return the positions and normals of some points in a frame."""
+        world = body.world[row, place[rows], :3]
+        points = np.einsum("pab,pb->pa", world[..., :3], skin.places[rows]) + world[..., 3]
+        return points / body.height, unit(
+            np.einsum("pab,pb->pa", world[..., :3], skin.normals[rows])
+        )
+
+    def step(row: int, number: int, near: Ints) -> Floats:
+        """Return how far a hand, moved as far as it is now, should go on."""
+        hands = [shifts[each][row] + result[each, row] for each in range(len(_ARMS))]
+        others, normals = posed(row, near)
+        belongs = with_other[number][near, None]
+        own = posed(row, chosen[number])[0] + hands[number]
+        # Of two hands, each gives way by half.
+        return _way_out(own, others + belongs * hands[1 - number], normals, 1.0 - 0.5 * belongs)
+
+    everything = np.arange(len(place), dtype=np.int32)
+    cases = []
+    for row in range(len(body.world)):
+        points, _ = posed(row, everything)
+        for number, hand in enumerate(chosen):
+            others = points + with_other[number][:, None] * shifts[1 - number][row]
+            own = points[hand] + shifts[number][row]
+            centre = own.mean(axis=0)
+            reach = np.linalg.norm(own - centre, axis=1).max() + _DEEP
+            is_near = ((others - centre) ** 2).sum(axis=1) < reach**2
+            is_near &= (skin.arms < 0) | (with_other[number] > 0.0)
+            near = np.flatnonzero(is_near).astype(np.int32)
+            if len(near) and step(row, number, near).any():
+                cases.append((row, number, near))
+    for _ in range(_ROUNDS):
+        steps = np.zeros_like(result)
+        for row, number, near in cases:
+            steps[number, row] = step(row, number, near)
+        if not steps.any():
+            break
+        result += steps
+        for start, stop in spans_of(timing):
+            result[:, start:stop] = _smoothed(result[:, start:stop], _WIDTH * timing.frame_rate)
+        for number, arm in enumerate(_ARMS):
+            wanted = shifts[number] + result[number]
+            result[number] = _within_reach(body, arm, wanted) - shifts[number]
     return result
+
+
+def _smoothed(curves: Floats, width: float) -> Floats:
+    """Return the moving averages of curves (..., N, 3), with weights that fall linearly."""
+    half = max(1, round(width))
+    weights = 1.0 - np.abs(np.arange(-half, half + 1)) / (half + 1.0)
+    padded = np.pad(curves, [(0, 0), (half, half), (0, 0)], mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(weights), axis=-2)
+    return windows @ (weights / weights.sum())
+
+
+def _way_out(points: Floats, others: Floats, normals: Floats, fractions: Floats) -> Floats:
+    """Return a translation (3,) of points (H, 3) out of the skin at other points (P, 3).
+
+    ``fractions``: (P, 1), how much of the way is gone.
+    """
+    nearest = ((others**2).sum(axis=1) - 2.0 * points @ others.T).argmin(axis=1)
+    away, outward = points - others[nearest], normals[nearest]
+    heights = np.einsum("ha,ha->h", away, outward)
+    inside = np.flatnonzero(heights < -_BEHIND * np.linalg.norm(away, axis=1))
+    result = np.zeros(3)
+    # The smallest translation out of the deepest point's plane, then out of those that are left.
+    for point in inside[heights[inside].argsort()]:
+        missing = -heights[point] - outward[point] @ result
+        result += max(missing, 0.0) * fractions[nearest[point]] * outward[point]
+    return result
+
+
+def _spread(points: Floats, count: int) -> Ints:
+    """Return the rows of at most ``count`` points, each the farthest from those before it."""
+    rows = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
+    distances = np.linalg.norm(points - points[rows[0]], axis=1)
+    while len(rows) < count and distances.max() > 0.0:
+        rows.append(int(distances.argmax()))
+        distances = np.minimum(distances, np.linalg.norm(points - points[rows[-1]], axis=1))
+    return np.array(rows, dtype=np.int32)
