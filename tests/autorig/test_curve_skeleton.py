@@ -111,6 +111,21 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
     assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
 
 
+def test_legs_of_a_wide_trunk_are_legs_of_both_sides(monkeypatch):
+    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 64))
+    # As of a crab: the legs meet at two hubs inside the trunk, to the left and right of its root.
+    trunk = pipe([(-0.8, 0.6, 0), (0.8, 0.6, 0)], 0.45, around=16)
+    legs = [
+        pipe([(0.9 * side, 0.6, 0.5 * z), (1.8 * side, 0.9, 1.5 * z), (2.3 * side, 0, 2 * z)], 0.08)
+        for side in (-1, 1)
+        for z in (0.6, 0.0, -0.6)
+    ]
+    names = found(united(trunk, *legs)).figure.skeleton.names
+    assert {"trunk_1_left", "trunk_1_right"} <= {*names}
+    ends = {f"leg_{number}_{side}_end" for number in (1, 2, 3) for side in ("left", "right")}
+    assert ends == {name for name in names if name.endswith("_end")}
+
+
 def test_left_follows_the_stated_front():
     skeleton = found(beast(), facing="-z").figure.skeleton
     joints = joints_of(skeleton)

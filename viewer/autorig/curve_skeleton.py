@@ -846,16 +846,19 @@ def joints_in(
     labels = _Names(tree, plane, partner, front if is_facing_known else None)
     chain_names = labels.of_chains(up, low, front)
     names, parents, places = ["root"], [-1], [_on(plane, tree.hubs[0])]
-    joint_of = {0: 0}
+    joint_of, counts = {0: 0}, dict[str, int]()
     for chain, name, own in zip(tree.chains, chain_names, points, strict=True):
         above = joint_of[chain.start]
         for index, place in enumerate(own):
-            ending = f"_{index + 1}" if index else ""
-            if name == _TRUNK:
-                ending = f"_{sum(each.startswith(_TRUNK) for each in names) + 1}"
+            if name.startswith(_TRUNK):
+                side = name.removeprefix(_TRUNK)
+                joint = f"{_TRUNK}_{counts.setdefault(side, 1)}{side}"
+                counts[side] += 1
             elif chain.end < 0 and index and index + 1 == len(own):
-                ending = "_end"
-            names.append(name + ending)
+                joint = name + "_end"
+            else:
+                joint = f"{name}_{index + 1}" if index else name
+            names.append(joint)
             parents.append(above)
             places.append(place)
             above = len(names) - 1
@@ -998,6 +1001,7 @@ class _Names:
         self, tree: Tree, plane: _Plane | None, partner: dict[int, int], front: Floats | None
     ) -> None:
         self._chains, self._plane, self._partner, self._front = tree.chains, plane, partner, front
+        self._radii = tree.radii
         self._names: dict[int, str] = {}
         self.limbs = self.pairs = 0
 
@@ -1007,8 +1011,8 @@ class _Names:
         for number, chain in enumerate(self._chains):
             if chain.start not in hubs:
                 continue
-            if chain.end >= 0 and chain.begin == 0.0 and number not in self._partner:
-                self._names[number] = _TRUNK
+            if self._is_trunk(number):
+                self._names[number] = _TRUNK + self._side(number)
                 hubs.add(chain.end)
             else:
                 top.append(number)
@@ -1024,6 +1028,24 @@ class _Names:
             self.limbs += len(unit)
             self.pairs += len(unit) == 2
         return [self._names[number] for number in range(len(self._chains))]
+
+    def _is_trunk(self, number: int) -> bool:
+        """Return whether a chain from the trunk belongs to it, too.
+
+        Those on both sides do if their hubs are parts of the same body, as of a wide crab, and not
+        the ends of limbs: the balls inside them overlap.
+        """
+        chain = self._chains[number]
+        if chain.end < 0 or chain.begin > 0.0:
+            return False
+        reach = float(self._radii[chain.start] + self._radii[chain.end])
+        return number not in self._partner or chain.length <= reach
+
+    def _side(self, number: int) -> str:
+        """Return the ending of a chain's name; none if it has no counterpart."""
+        if number not in self._partner:
+            return ""
+        return "_left" if self._is_left(number, self._partner[number]) else "_right"
 
     def _units(self, numbers: list[int], front: Floats) -> list[tuple[int, ...]]:
         """Return pairs (left, right) and single chains, from front to back."""
