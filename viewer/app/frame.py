@@ -34,6 +34,7 @@ from viewer.app.posing.gizmo import draw_gizmo
 from viewer.app.posing.shape_panel import drop_unreadable_shapes
 from viewer.app.preferences.applying import follow_preferences
 from viewer.app.recording.recording import Preview, draw_record_dialog, start_recording
+from viewer.app.rigging.facing import FacingPictures
 from viewer.app.rigging.joint_editing.frames import update_joints
 from viewer.app.rigging.joint_editing.overlay import draw_joint_edits
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
@@ -62,6 +63,7 @@ class Frame:
         self.renderer = Renderer(programs)
         self.target: Target | None = None
         self._preview = Preview(programs)
+        self._fronts = FacingPictures(programs)
         self.outlines = OutlineLayer(self.context)
         self._drawn: object = None
         self._n_frames = 0
@@ -145,6 +147,7 @@ class Frame:
         if step is not None:
             self._draw_target(size, step)
         self._preview.draw(state, key)
+        self._fronts.draw(state)
         if self.target is not None:
             corner = (x + size[0] / scale, y + size[1] / scale)
             draw_list = imgui.get_background_draw_list()
@@ -221,6 +224,13 @@ class Frame:
             if work is not None:
                 work.cancel()
         manual = self.state.of(Manual)
-        for item in (self.target, self._preview, self.outlines, self.renderer, manual):
+        for item in (
+            self.target,
+            self._preview,
+            self._fronts,
+            self.outlines,
+            self.renderer,
+            manual,
+        ):
             if item is not None:
                 item.release()

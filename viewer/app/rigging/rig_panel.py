@@ -28,6 +28,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import ask_for_files
+from viewer.app.rigging.facing import FacingChoice, draw_fronts, fronts_now
 from viewer.app.rigging.joint_editing.section import draw_section
 from viewer.app.rigging.placing import (
     aligned_template,
@@ -131,6 +132,8 @@ def draw(state: AppState) -> None:
     with disabled(state, why):
         if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)
+    if fronts_now(state):
+        _draw_front(state)
     if not rigging.results:
         return
     if rigging.scrolls:
@@ -139,6 +142,17 @@ def draw(state: AppState) -> None:
         imgui.set_scroll_here_y(0.0)
     if _section("Result", "the rigged mesh, in place of the target"):
         draw_results(state)
+
+
+def _draw_front(state: AppState) -> None:
+    """Draw the choice of the front, and scroll to it if it has just been asked for."""
+    facing = state.of(FacingChoice)
+    if facing.scrolls:
+        facing.scrolls -= 1
+        imgui.set_scroll_here_y(0.0)
+        imgui.set_next_item_open(True)
+    if _section("Front", "front and back of the target look alike"):
+        draw_fronts(state)
 
 
 def _section(title: str, text: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -63,6 +63,8 @@ GHOSTS: dict[Literal[""] | GhostStyle, str] = {
 """Styles in which the template is drawn, with their labels."""
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
+FACING = "R004.facing"
+"""Key of the message that front and back look alike."""
 SHAPE = "shape"
 """Key of the template that is a skeleton found in the target's shape."""
 _USUAL, _FOUND = TransferSettings(), SkeletonSettings()
@@ -115,6 +117,20 @@ class Placing:
     """Target mesh and template figure for which the placement is valid."""
     pose: tuple[object, ...]
     """Key of the template's pose for which the placement was found."""
+    front: str = ""
+    """The axis that the target faces; empty if front and back do not look alike."""
+    other: Placing | None = None
+    """The placement that faces the other way, if front and back look alike."""
+
+    @property
+    def asks(self) -> bool:
+        """Whether a person still has to tell front and back."""
+        return any(line.key == FACING for line in self.lines)
+
+    @property
+    def answered(self) -> Placing:
+        """The same placement without that question."""
+        return replace(self, lines=tuple(line for line in self.lines if line.key != FACING))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
+from viewer.app.rigging.facing import ask_facing
 from viewer.app.rigging.placing import aligned_template, placing_now, target_place
 from viewer.app.rigging.results import compare, put_results, show_match
 from viewer.app.rigging.rigging import (
@@ -33,7 +34,7 @@ from viewer.app.rigging.rigging import (
 )
 from viewer.autorig.alignment.anatomy_fit import left_of
 from viewer.autorig.alignment.orientation_search import axis_direction, nearest_axis
-from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.posed_alignment import PosedAlignment, align_posed
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.alignment.surface_alignment import (
     AlignmentSettings,
@@ -277,6 +278,8 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
                 state.history.exchange(asked, known)
                 return
             rigging.placing = found
+            if found.asks:
+                ask_facing(state)
             if rigging.tool == "landmarks":
                 rigging.tool = ""  # the template is shown aligned, not next to the target
 
@@ -323,6 +326,8 @@ class AlignedStart:
     similarity: Similarity | None
     """Maps it to the target; None for a skeleton without a mesh, which is used where it is or where
     it fits."""
+    placing: Placing | None = None
+    """Its placement, if there is one."""
 
 
 def aligned_start(state: AppState) -> Callable[[], AlignedStart]:
@@ -338,7 +343,7 @@ def aligned_start(state: AppState) -> Callable[[], AlignedStart]:
         if found is None:
             with part_of_work("Aligning", (0.0, 0.7)):
                 found = align_template(template, own or template, mesh, settings, fits)
-        return AlignedStart(own or template, found.fitted or template, found.similarity)
+        return AlignedStart(own or template, found.fitted or template, found.similarity, found)
 
     return act
 
@@ -394,6 +399,14 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
     )
     if target is None:
         return
+    needs_front = "robust" in methods
+
+    def go_on(state: AppState) -> None:
+        start_run(state, methods)
+
+    if placing is not None and placing.asks and needs_front:
+        ask_facing(state, go_on)
+        return
     take, mesh, name = _snapshot(state, aligned=True), target_mesh(state), target.title
     place, own = target_place(target), current_template(state)
     searched = _search_settings(state)
@@ -403,10 +416,13 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
         template, found = take(), placing
         start = 0.4 if template.key == SHAPE else 0.0
         aligned = template
-        if found is None and "robust" in methods:
+        if found is None and needs_front:
             start, how = 0.4, searched
             with part_of_work("Aligning", (0.0, start)):
                 found = align_template(template, own or template, mesh, how, choices.fits)
+            if found.asks:
+                asked = found
+                return lambda state: put_question(state, template, asked, go_on)
             aligned = found.fitted or template
         results = []
         for number, method in enumerate(methods):
@@ -431,6 +447,13 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
     begin_work(state, f"Rigging {printable(name, 40)}", act, "rigging")
 
 
+def put_question(state: AppState, template: Template, placing: Placing, then: _Finish) -> None:
+    """Keep an alignment whose front is doubtful, and ask for the front before going on."""
+    _keep(state, template)
+    state.of(Rigging).placing = placing
+    ask_facing(state, then)
+
+
 def align_template(
     template: Template,
     own: Template,
@@ -442,16 +465,22 @@ def align_template(
     figure, plain = _unshaped(template)
     found = align_posed(figure, plain, target, settings, fits)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
-    is_fitted = is_other or bool(found.lines)
-    return Placing(
-        similarity=found.alignment.similarity,
-        alignment=found.alignment,
-        settings=settings,
-        fitted=replace(template, figure=found.figure, pose=found.pose) if is_fitted else None,
-        lines=found.lines,
-        meshes=(target, own.figure),
-        pose=pose_key(own.pose),
-    )
+
+    def placed(fit: PosedAlignment) -> Placing:
+        is_fitted = is_other or bool(fit.lines)
+        return Placing(
+            similarity=fit.alignment.similarity,
+            alignment=fit.alignment,
+            settings=settings,
+            fitted=replace(template, figure=fit.figure, pose=fit.pose) if is_fitted else None,
+            lines=fit.lines,
+            meshes=(target, own.figure),
+            pose=pose_key(own.pose),
+            front=fit.front,
+            other=None if fit.other is None else placed(fit.other),
+        )
+
+    return placed(found)
 
 
 def _with_known_method(

@@ -18,7 +18,7 @@ from viewer.app.rigging.joint_editing.rest_meshes import plane_of, rest_mesh
 from viewer.app.rigging.joint_editing.state import NOT_KEPT, JointEditing, TemplateFit, show
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Rigging, Template, choose_target, target_mesh, targets
-from viewer.app.rigging.work import aligned_start, begin_work
+from viewer.app.rigging.work import AlignedStart, aligned_start, begin_work, put_question
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.binding import enclosed
 from viewer.autorig.pipeline import transfer
@@ -53,8 +53,8 @@ class _Begun:
     """The template that was fitted, as it was before."""
 
 
-_Start: TypeAlias = Callable[[], _Begun]
-"""Computes the figure to edit, in a thread."""
+_Start: TypeAlias = Callable[[], _Begun | AlignedStart]
+"""Computes the figure to edit, in a thread; or a template whose front is doubtful."""
 
 
 def subject(state: AppState) -> Actor:
@@ -98,6 +98,10 @@ def start_editing(state: AppState) -> None:
 
     def act() -> Callable[[AppState], None]:
         begun = take()
+        if isinstance(begun, AlignedStart):
+            placing = begun.placing
+            assert placing is not None  # it asks
+            return lambda state: put_question(state, begun.template, placing, start_editing)
         mesh = rest_mesh(begun.figure)
         report(90, 100, "", "Looking for the plane of symmetry")
         plane_of(begun.figure, mesh)  # so that no click has to wait for it
@@ -117,8 +121,10 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
     how = weight_settings(state)
     start = aligned_start(state)
 
-    def act() -> _Begun:
+    def act() -> _Begun | AlignedStart:
         found = start()
+        if found.placing is not None and found.placing.asks:
+            return found
         template, similarity = found.fitted, found.similarity
         pose, settings = template.pose, AlignmentSettings()
         skeleton = shaped_skeleton(template.figure, pose.shape_weights)
