@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from autorig.moving_shapes import two_boxes, write_frames
+from autorig.moving_shapes import tube, two_boxes, write_frames
 
 from viewer.errors import ViewerError
 from viewer.loading.mesh_sequence import frame_numbers, read_mesh_sequence, stores_frames
 
 POSITIONS, FACES = two_boxes()
+ORDER = np.random.default_rng(1).permutation(16)
 
 
 def written(folder, positions=POSITIONS, faces=FACES, **options):
@@ -69,6 +70,11 @@ def test_quads_may_be_divided_along_either_diagonal(tmp_path):
             lambda p, f: (p, [*f[:11], (9, 13, 15, 12)]),
             r"_2.obj:28: expected vertices .* as in box_1.obj, found",
         ),
+        # The same closed mesh with its vertices in another order.
+        (
+            lambda p, f: (p[ORDER], np.argsort(ORDER)[f]),
+            r"_2.obj:17: expected vertices .* as in box_1.obj, found",
+        ),
     ],
 )
 def test_first_element_that_differs_is_named(tmp_path, change, message):
@@ -77,6 +83,20 @@ def test_first_element_that_differs_is_named(tmp_path, change, message):
     written(tmp_path, [positions], faces, numbers=[2])
     with pytest.raises(ViewerError, match=message):
         read_mesh_sequence([first, second])
+
+
+def test_vertices_in_another_order_with_the_same_faces_are_refused(tmp_path):
+    _, positions, quads, _ = tube(3, n_rings=40)
+    paths = written(tmp_path, positions, quads)
+    read_mesh_sequence(paths)
+    mixed = positions[1][np.random.default_rng(2).permutation(len(positions[1]))]
+    written(tmp_path, [mixed], quads, numbers=[2])
+    message = r"box_2.obj: expected edges about as long as in box_1.obj, found half of them more"
+    with pytest.raises(ViewerError, match=message):
+        read_mesh_sequence(paths)
+    # Growth is no other order.
+    moving, _ = read_mesh_sequence(written(tmp_path, [positions[0], 50.0 * positions[1]], quads))
+    assert moving.n_frames == 2
 
 
 @pytest.mark.parametrize(

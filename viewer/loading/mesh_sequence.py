@@ -29,7 +29,7 @@ from viewer.formats._archive.checking import archive_of, corners_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._body_keys import rate_in
 from viewer.formats._polygons import triangulate
-from viewer.phrases import axes, counted, listed, printable
+from viewer.phrases import axes, counted, listed, printable, rounded
 from viewer.progress import report
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -44,6 +44,10 @@ ARCHIVES = (".npz", ".npy")
 _VERTICES = ("vertices", "verts", "positions", "points", "arr_0")
 _FACES = ("faces", "triangles", "f")
 _LARGEST = 1 << 40  # bytes of an archive, of which one frame is in memory
+# Median ratio of the lengths of edges, beyond the growth of the mesh, at which vertices are in
+# another order: skin and cloth stretch to at most about twice their length.
+_STRETCHED = 3.0
+_TINY = 1e-300
 _NUMBER = re.compile(r"(\d+)(?=\D*$)")
 
 
@@ -72,6 +76,7 @@ def read_mesh_sequence(
         source = Source.open(path)
         figure = _mesh_of(source)
         _check_same(source, figure.require_mesh(), mesh, ordered[0])
+        _check_order(source, figure.require_mesh(), mesh, ordered[0])
         positions[number] = figure.require_mesh().positions
         if number == row:
             bound = figure
@@ -255,23 +260,52 @@ def _check_same(source: Source, mesh: Mesh, first: Mesh, path: Path) -> None:
         )
 
 
+def _check_order(source: Source, mesh: Mesh, first: Mesh, path: Path) -> None:
+    """Raise if the vertices of a file are probably those of the first file in another order."""
+    lengths, before = (_edge_lengths(each) for each in (mesh, first))
+    grown = np.ptp(mesh.positions, axis=0).max() / max(np.ptp(first.positions, axis=0).max(), _TINY)
+    known = before > 0.0
+    if not known.any():
+        return
+    ratio = float(np.median(lengths[known] / before[known]))
+    if ratio > _STRETCHED * max(grown, 1.0):
+        raise FormatError.fault(
+            "F004.sequence-order: expected edges about as long as in {first}, found half of them "
+            "more than {ratio} times as long: the vertices seem to be in another order",
+            source.path,
+            first=printable(path.name, 60),
+            ratio=rounded(ratio, 2),
+        )
+
+
+def _edge_lengths(mesh: Mesh) -> Floats:
+    """Return the lengths of the sides of all triangles (3 T,)."""
+    corners = mesh.positions[mesh.triangles]
+    found: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel()
+    return found
+
+
 def _first_other_face(triangles: Ints, others: Ints) -> int | None:
     """Return a row of the first face that differs, regardless of the diagonals of polygons."""
     differs = (np.sort(triangles, axis=1) != np.sort(others, axis=1)).any(axis=1)
     if not differs.any():
         return None
-    # The triangles of a polygon have its outline as their boundary, however it is divided: without
-    # the triangles that both have, the boundaries (edges that an odd number has) must be equal.
-    if np.array_equal(_odd_edges(triangles[differs]), _odd_edges(others[differs])):
-        return None
-    return int(differs.argmax())
+    # The triangles of a polygon follow each other, and have its outline as their boundary (the
+    # edges that an odd number of them has) however it is divided. That of a whole closed mesh is
+    # empty, whatever its faces are.
+    rows = np.flatnonzero(differs)
+    first, outline, other = int(rows[0]), set[tuple[int, int]](), set[tuple[int, int]]()
+    for row, following in zip(rows.tolist(), [*rows[1:].tolist(), -1], strict=True):
+        outline ^= _edges(triangles[row])
+        other ^= _edges(others[row])
+        if outline and outline == other:
+            first, outline, other = following, set(), set()
+    return None if first < 0 else first
 
 
-def _odd_edges(triangles: Ints) -> Ints:
-    """Return the edges (E, 2) that an odd number of triangles has, in order."""
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    found, counts = np.unique(edges, axis=0, return_counts=True)
-    return found[counts % 2 == 1]
+def _edges(triangle: Ints) -> set[tuple[int, int]]:
+    a, b, c = sorted(triangle.tolist())
+    return {(a, b), (b, c), (a, c)}
 
 
 def _line(source: Source, kind: str, index: int) -> int | None:
