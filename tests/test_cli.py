@@ -1,11 +1,13 @@
 """The command line as a program: exit codes, one-line messages, signals, pipes, imports."""
 
 import gc
+import io
 import os
 import signal
 import stat
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -264,25 +266,37 @@ def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["with blank", "quo'te\"s", "{x} %s %(a)d", "new\nline", "-1", "umläut", b"un\xffdecodable"],
-)
+def _asked(*arguments) -> tuple[int, str, str]:
+    """Return exit code, output and errors of a command in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = run(arguments)
+    return code, out.getvalue(), err.getvalue()
+
+
+def _asked_of_program(*arguments) -> tuple[int, str, str]:
+    """Return the same of a program of its own, which decodes its arguments itself."""
+    done = call(*map(os.fsencode, arguments))
+    return done.returncode, os.fsdecode(done.stdout), os.fsdecode(done.stderr)
+
+
+NAMES = ["with blank", "quo'te\"s", "{x} %s %(a)d", "new\nline", "-1", "umläut"]
+UNDECODABLE = os.fsdecode(b"un\xffdecodable")
+
+
+@pytest.mark.parametrize("name", [*NAMES, UNDECODABLE], ids=ascii)
 def test_unusual_file_names_are_accepted(tmp_path, name):
-    folder = os.fsencode(tmp_path)
-    path = os.path.join(folder, os.fsencode(name) + b".skel")  # noqa: PTH118
-    with open(path, "w") as stream:  # noqa: PTH123
-        stream.write("balljoint root { pose 1 0 0 }")
-    done = call("info", path)
-    assert done.returncode == 0 and not done.stderr
-    out = os.path.join(folder, os.fsencode(name) + b".png")  # noqa: PTH118
-    done = call("render", path, b"--output", out, *QUICK)
-    assert (
-        done.returncode == 0 and done.stdout.count(b"\n") == 1 and Path(os.fsdecode(out)).is_file()
-    )
-    with open(path, "w") as stream:  # noqa: PTH123
-        stream.write("balljoint root { pose 1 0 }")
-    _refused(call("info", path), 2)
+    # Only the decoding of arguments and the encoding of output need a program.
+    ask = _asked_of_program if name == UNDECODABLE else _asked
+    path, out = tmp_path / f"{name}.skel", tmp_path / f"{name}.png"
+    path.write_text("balljoint root { pose 1 0 0 }")
+    code, _, problems = ask("info", str(path))
+    assert code == 0 and not problems
+    code, told, _ = ask("render", str(path), "--output", str(out), *QUICK)
+    assert code == 0 and told.count("\n") == 1 and out.is_file()
+    path.write_text("balljoint root { pose 1 0 }")
+    code, _, problems = ask("info", str(path))
+    assert code == 2 and problems.count("\n") == 1 and ": " in problems
 
 
 def test_files_after_two_dashes_may_begin_with_a_dash(tmp_path):
