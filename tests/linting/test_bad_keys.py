@@ -83,6 +83,11 @@ def freeze(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     bends[27:39] = bends[26]
 
 
+def freeze_at_the_peak(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """From the frame in which the arm turns back, when it is slow anyway."""
+    bends[16:28] = bends[15]
+
+
 def hyperextend(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     bends[20:30] = np.interp(K[20:30], [20, 25, 30], [70.0, -40.0, 50.0])
 
@@ -111,6 +116,10 @@ FAULTS = {
     "pop of a fast joint": (pop_in_a_twist, "C020.rotation", [3], {"size": "24°"}, [30]),
     "spike": (spike, "C020.position", [0], {"size": "400 mm"}, [30]),
     "frozen": (freeze, "C021.frames", [], {"ranges": ["frames 27 to 38"]}, [*range(27, 39)]),
+    "frozen at the peak": (
+        *(freeze_at_the_peak, "C021.frames", []),
+        *({"ranges": ["frames 16 to 27"]}, [*range(16, 28)]),
+    ),
     "hyperextended": (hyperextend, "C024.hinge", [3], {"angle": pytest.approx(40.0)}, None),
     "stretched": (lengthen, "C022.bones", [4], {"ratio": "1.5"}, None),
     "scaled": (grow, "C023.scales", [2], {"ratio": "1.4"}, [*range(39, 60)]),
@@ -150,6 +159,12 @@ def hold(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     bends[:] = 20.0 + 40.0 * np.sin(eased)
 
 
+def snap(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """A pose that is held, and another one 90 degrees away, which settles."""
+    eased = 20.0 * np.sin(np.linspace(0.0, 0.5 * np.pi, 24))
+    bends[:] = np.concatenate([eased, np.full(12, 20.0), 110.0 + eased])
+
+
 def flap(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     """Three beats a second, up to 15 degrees a frame."""
     bends[:] = 40.0 + 24.0 * np.sin(2.0 * np.pi * 3.0 * K / RATE)
@@ -165,7 +180,7 @@ def walk(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("is_captured", [False, True])
-@pytest.mark.parametrize("change", [nothing, strike, hold, flap, straighten, walk])
+@pytest.mark.parametrize("change", [nothing, strike, hold, snap, flap, straighten, walk])
 def test_sound_motion_has_no_finding(change, is_captured):
     assert linted(change, is_captured) == []
 

@@ -10,13 +10,23 @@ from viewer.diagnostics import frame_range
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, track_of
 from viewer.phrases import counted, listed
+from viewer.rigs.arrays import Floats
 from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.geometry.quaternion import angles_between
 
-# A body that holds a pose slows down before, and speeds up again. Frames that were written twice do
-# not: the steps beside them are those of the moving body, compared with the median of the clip.
-_STILL = 0.01  # maximum step of a frozen frame, relative to that median
-_MOVING = 0.5  # minimum step beside them
+# A body that holds a pose slows down before, and speeds up again, one joint after another. Frames
+# that were written twice do not: most joints that move at all then stop within a frame, whether the
+# motion is quick or an idle.
+_STILL = 0.01  # maximum step of a frozen frame, relative to the median of the clip
+# A joint that slows down evenly moves by 9, 7, 5, 3 and 1 units, so that its last step is 0.2 of
+# their median; one that stops within a frame moves by about that median.
+_ABRUPT, _BESIDE = 0.5, 5  # minimum ratio of that step, and the number of steps
+_MOST_JOINTS = 0.5  # minimum fraction of the moving joints that stop and go on so
+# Frames that were replaced by copies of one hide the movement, which the body catches up within a
+# frame: most joints move by more than in any frame around, and together about as far as they move
+# elsewhere in that time. A pose that snaps into the next one is not that close.
+_JUMP = 3.0  # minimum ratio of that step to those around
+_CATCHES_UP = 0.3, 2.0  # its ratio to the median step times the number of frames
 _FOR = 0.1  # seconds; a recording that was written at a higher rate repeats frames for less
 _ROUNDING = 1e-6  # maximum step, radians or relative to the size, of a body that rests
 _MOSTLY = 0.5  # minimum fraction of frames in which the body moves
@@ -44,14 +54,14 @@ def check(subject: Subject) -> Iterator[Finding]:
     still = (steps < _STILL * usual) & (moves.mean(axis=1) < _STILL * usual)
     step = float(track.times[rows[1]] - track.times[rows[0]])
     least = max(_FEWEST, round(_FOR / step))
+    turning = np.where(known[:, None], turns, 0.0)
     found = [
         (first, last)
         for first, last in runs_of(still)
         if last - first >= least
         and first > 0
         and last < len(steps)
-        and steps[first - 1] > _MOVING * usual
-        and steps[last] > _MOVING * usual
+        and _is_frozen(turning, first, last, usual)
         and _is_keyed(subject, rows[first], rows[last], track)
     ]
     if not found:
@@ -73,6 +83,31 @@ def check(subject: Subject) -> Iterator[Finding]:
         times=track.times[frames],
         at=("frames", int(frames[0])),
     )
+
+
+def _is_frozen(turns: Floats, first: int, last: int, usual: float) -> bool:
+    """Return whether still steps are no hold; turns (F, J) of all steps, and their median."""
+    moving = turns[:, (turns > _ROUNDING).mean(axis=0) > _MOSTLY]
+    before, after = moving[max(first - _BESIDE, 0) : first], moving[last : last + _BESIDE]
+    if moving.shape[1] == 0:
+        return False
+    if _is_abrupt(before[::-1]) and _is_abrupt(after):
+        return True
+    for step, around in (
+        (first - 1, np.concatenate([before[:-1], after])),
+        (last, np.concatenate([before, after[1:]])),
+    ):
+        jumps = (moving[step] > _JUMP * around.max(axis=0)).mean() > _MOST_JOINTS
+        hidden, caught = (last - first) * usual, float(turns[step].mean())
+        if jumps and _CATCHES_UP[0] * hidden < caught < _CATCHES_UP[1] * hidden:
+            return True
+    return False
+
+
+def _is_abrupt(steps: Floats) -> bool:
+    """Return whether most joints move beside a hold at once; steps (N, J), the nearest first."""
+    abrupt = (steps[0] > _ROUNDING) & (steps[0] > _ABRUPT * np.median(steps, axis=0))
+    return bool(abrupt.mean() > _MOST_JOINTS)
 
 
 def _is_keyed(subject: Subject, first: int, last: int, track: Track) -> bool:
