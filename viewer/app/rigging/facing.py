@@ -89,7 +89,9 @@ def draw_fronts(state: AppState) -> None:
     if placing.asks:
         warning("Front and back look alike. Click the picture that shows the front:")
     else:
-        imgui.text_wrapped("Front and back look alike. Click the other picture to turn the rig:")
+        imgui.text_wrapped(
+            "Front and back look alike. To turn the rig, click the other picture and press Run:"
+        )
     style = imgui.get_style()
     border = 2.0 * style.frame_padding.x
     width = 0.5 * (imgui.get_content_region_avail().x - style.item_spacing.x) - border
