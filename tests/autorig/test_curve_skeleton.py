@@ -217,9 +217,9 @@ def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
     field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
-    # A fin: as long as it is wide, to a tenth.
-    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.78, (0,))))
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.85, (0,))))
+    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.6, (0,))))
+    # The corner of a fan, as a bird's tail, is no limb.
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.75, (0,))))
     assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), None))
 
 

@@ -66,9 +66,7 @@ _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
 # Shortest limb: relative to the half width of its base, to the size, and in voxels. A bump is
 # wider than long.
 _OWN, _SHORTEST, _VOXELS = 1.0, 0.03, 3.0
-# Length of a limb relative to the half width of its neck, from which it is one wherever it is: that
-# of a fin, which is about as long as it is wide.
-_LONG = 2.0
+_LONG = 3.0  # length of a limb relative to its neck, from which it is one wherever it is
 # A hub's reach relative to the solid's radius there: two branches that touch the same inscribed
 # ball are one.
 _REACH = 1.0
