@@ -17,6 +17,7 @@ from viewer.rigs.kinematics import rigid_sizes
 from viewer.rigs.motion.instances import ArrayTable, placements
 from viewer.rigs.pose import Pose, PoseArrays, placement_matrix, pose_arrays_of
 from viewer.rigs.scene import Actor
+from viewer.rigs.watched_arrays import Watch, unwatched
 
 FEWEST = 8
 """Minimum number of actors to draw as instances."""
@@ -80,7 +81,7 @@ class Crowd:
 
     def update(self) -> None:
         """Gather the values of all actors, and raise the versions of what changed."""
-        differ = self._table.update([pose.values for pose in self.poses])
+        differ = self._table.update(list(map(unwatched("values"), self.poses)))
         if differ is not None:
             changed = differ[:, :-3].any(axis=1)
             if changed.any():
@@ -90,7 +91,7 @@ class Crowd:
         self._place(differ is not None and bool(differ[:, -3:].any()))
 
     def _place(self, is_shifted: bool) -> None:
-        moved = self._places.update([actor.placement for actor in self.actors])
+        moved = self._places.update(list(map(unwatched("placement"), self.actors)))
         scales = [pose.figure_scale for pose in self.poses]
         colors = [actor.color for actor in self.actors]
         is_turned = moved is not None or scales != self._scales
@@ -162,6 +163,14 @@ class Lineup:
 
     key: tuple[object, ...] = ()
     """All that decides about the other fields; see ``lineup``."""
+    shapes: tuple[list[int], bytes] = field(default_factory=lambda: ([], b""))
+    """Number of shape weights of each pose, and all weights."""
+    looks: tuple[object, ...] = ()
+    """What crowds know of their actors besides, but for arrays that are watched."""
+    poses: Watch = field(default_factory=lambda: Watch("values", "shape_weights"))
+    """Of all poses, drawn or not."""
+    places: Watch = field(default_factory=lambda: Watch("placement"))
+    """Of all actors."""
     crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
     """Actors whose meshes may be drawn together."""
     joint_crowds: dict[CrowdKey, Crowd] = field(default_factory=dict)
@@ -213,18 +222,23 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
     """
     # What an actor draws, but for the numbers of poses and placements. Lists of the same objects
     # are compared quickly.
-    poses = [actor.own_pose for actor in actors]
+    own_poses = [actor.own_pose for actor in actors]
     states = (
         [actor.figure for actor in actors],
-        poses,
+        own_poses,
         [actor.visible for actor in actors],
         [actor.is_present for actor in actors],
         [actor.opacity for actor in actors],
         [actor.hidden_parts for actor in actors],
         [actor.points is None for actor in actors],
     )
-    weights = [pose.shape_weights for pose in poses if pose is not None]
-    shapes = list(map(len, weights)), np.concatenate([np.zeros(0), *weights]).tobytes()
+    poses = [pose for pose in own_poses if pose is not None]
+    looks = [pose.figure_scale for pose in poses], [actor.color for actor in actors]
+    watches, shapes = (before.poses, before.places), before.shapes
+    are_still = before.poses.look(poses), before.places.look(actors)
+    if not are_still[0]:
+        weights = list(map(unwatched("shape_weights"), poses))
+        shapes = list(map(len, weights)), np.concatenate([np.zeros(0), *weights]).tobytes()
     views = options.show, options.shading == "scalar", options.wireframe, options.normals
     shown = options.opacity, options.captured_keypoints, options.keypoints
     key = list(actors), *states, shapes, views, shown, FEWEST
@@ -232,6 +246,9 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
         drawn = [actor for actor in actors if actor.is_drawn]
         before = Lineup(
             key,
+            shapes,
+            looks,
+            *watches,
             _crowds(drawn, options, before.crowds),
             _joint_crowds(drawn, options, before.joint_crowds),
             drawn,
@@ -239,8 +256,13 @@ def lineup(actors: Sequence[Actor], options: DisplayOptions, before: Lineup) -> 
             with_points(drawn, options),
             with_markers(drawn, options),
         )
+    elif all(are_still) and looks == before.looks:
+        return before
     for crowd in (*before.crowds.values(), *before.joint_crowds.values()):
         crowd.update()
+    before.looks = looks
+    for watch in watches:
+        watch.keep()
     return before
 
 

@@ -26,6 +26,7 @@ from viewer.rigs.geometry.rotation import (
 from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.memo import Memo, NumberKey
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs, find_joint
+from viewer.rigs.watched_arrays import unwatched, watched
 
 if TYPE_CHECKING:
     from viewer.rigs.skin import Skin
@@ -39,6 +40,7 @@ _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _PER_JOINT = 10  # a translation, a quaternion and three scale factors
 
 
+@watched("values", "shape_weights")
 @dataclass(slots=True, eq=False)
 class Pose:
     """The mutable state of one figure; arrays are changed in place.
@@ -64,6 +66,8 @@ class Pose:
     """The joints that ``pose["left_knee"]`` names."""
     posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
     """Cached matrices; up to date if they have the key of the current values."""
+    handed: object = field(default=None, init=False, repr=False)
+    """Another object whenever the values or the shape weights were asked for or set."""
     _key: NumberKey | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -126,7 +130,7 @@ class Pose:
 
         Poses with equal keys have the same joints and need no second skinning.
         """
-        arrays = self.values[:-3], self.shape_weights
+        arrays = unwatched("values")(self)[:-3], unwatched("shape_weights")(self)
         self._key = NumberKey(*arrays) if self._key is None else self._key.updated(*arrays)
         return self._key
 
@@ -156,7 +160,8 @@ class Pose:
 
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""
-        numbers = self.values.copy(), self.n_dofs, self.shape_weights.copy()
+        values, weights = unwatched("values")(self), unwatched("shape_weights")(self)
+        numbers = values.copy(), self.n_dofs, weights.copy()
         return Pose(*numbers, self.figure_scale, self.skeleton)
 
 
@@ -204,7 +209,7 @@ class PoseKey(NamedTuple):
 
 def pose_key(pose: Pose) -> PoseKey:
     """Return a key that identifies the pose. Nothing is copied unless a value has changed."""
-    place = tuple(pose.figure_translation.tolist())
+    place = tuple(unwatched("values")(pose)[-3:].tolist())
     return PoseKey(pose.skinning_key, pose.n_dofs, pose.figure_scale, place)
 
 

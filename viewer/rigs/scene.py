@@ -26,6 +26,7 @@ from viewer.rigs.motion.timing import DEFAULT_RATE, frame_times
 from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.shape import shaped_skeleton
 from viewer.rigs.skeleton import FIRST_ROTATION
+from viewer.rigs.watched_arrays import watched
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,6 +62,7 @@ class Swinging(Protocol):
         """Rotate the spring joints of an actor, already posed by its clip at a time, in place."""
 
 
+@watched("placement")
 @dataclass(slots=True, eq=False)
 class Actor:
     """A figure posed and placed in a scene."""
@@ -103,6 +105,8 @@ class Actor:
     clip_origin: tuple[Path, Motion] | None = None
     """File of its motion, and the clip as it was opened: an edited one is another object. Clips
     that are animations of the figure come from the file of the figure."""
+    handed: object = field(default=None, init=False, repr=False)
+    """Another object whenever the placement was asked for or set."""
 
     @property
     def title(self) -> str:

@@ -543,6 +543,89 @@ def test_only_changed_actors_are_skinned_and_uploaded(offscreen, work):
     assert draw("final").get("write", 0) == 0
 
 
+def _held(array):
+    """Return a function that writes an array held from now on, and lets go of it."""
+    held = [array]
+
+    def write() -> None:
+        held.pop()[..., 0] += 0.5
+
+    return write
+
+
+def _replaced(scene, number: int) -> None:
+    one = scene.actors[number]
+    scene.actors[number] = replace(one, own_pose=one.pose.copy(), placement=one.placement + 1.0)
+
+
+def _set(owner, name: str, value) -> None:
+    setattr(owner, name, value)
+
+
+CHANGES = {
+    "dofs": lambda scene: scene.actors[3].pose.dofs.__setitem__(3, 0.7),
+    "rotations": lambda scene: scene.actors[3].pose.rotations.__setitem__(1, (1, 0, 0, 0)),
+    "figure_translation": lambda scene: scene.actors[3].pose.figure_translation.fill(2.0),
+    "figure_scale": lambda scene: _set(scene.actors[3].pose, "figure_scale", 2.0),
+    "all values": lambda scene: _set(scene.actors[3].pose, "values", scene.actors[4].pose.values),
+    "pose": lambda scene: _set(scene.actors[3], "pose", scene.actors[4].pose.copy()),
+    "placement in place": lambda scene: scene.actors[3].placement.__setitem__((0, 3), 9.0),
+    "placement": lambda scene: _set(scene.actors[3], "placement", 3.0 * np.eye(4)),
+    "color": lambda scene: _set(scene.actors[3], "color", (0.1, 0.2, 0.3)),
+    "opacity": lambda scene: _set(scene.actors[3], "opacity", 0.5),
+    "visibility": lambda scene: _set(scene.actors[3], "visible", False),
+    "presence": lambda scene: _set(scene.actors[3], "is_present", False),
+    "order": lambda scene: scene.actors.reverse(),
+    "removal": lambda scene: scene.actors.pop(3),
+    "addition": lambda scene: scene.actors.append(scene.actors[3].copy()),
+    "replacement": lambda scene: _replaced(scene, 3),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("n_frames", [0, 1, 3])
+def test_crowds_see_every_change_of_a_scene_that_was_still(change, n_frames):
+    scene, options, drawn = crowd(12, **COARSE), DisplayOptions(), lineup.Lineup()
+    # An actor may be written by others at all times, or the scene is as still as can be.
+    writes = [_held(scene.actors[5].placement), _held(scene.actors[6].pose.dofs)]
+    for step in range(4):
+        for _ in range(n_frames):
+            drawn = lineup.lineup(scene.actors, options, drawn)
+        if step < len(writes):
+            writes[step]()
+        elif step == 2:
+            CHANGES[change](scene)
+        drawn = lineup.lineup(scene.actors, options, drawn)
+        one = max(drawn.crowds.values(), key=lambda one: len(one.actors))
+        shown = [actor for actor in scene.actors if actor.is_drawn and actor.opacity == 1.0]
+        assert one.actors == shown
+        models = [actor.placement @ placement_matrix(actor.pose) for actor in shown]
+        assert np.array_equal(one.models, models)
+        assert np.array_equal(one.arrays.dofs, [actor.pose.dofs for actor in shown])
+        assert np.array_equal(one.arrays.rotations, [actor.pose.rotations for actor in shown])
+        assert one.colors == [actor.color for actor in shown]
+
+
+def test_nothing_of_a_still_crowd_is_compared(monkeypatch):
+    scene, options, drawn = crowd(20, **COARSE), DisplayOptions(show="both"), lineup.Lineup()
+    compare, compared = lineup.ArrayTable.update, []
+
+    def counted(self, arrays):
+        compared.append(len(arrays))
+        return compare(self, arrays)
+
+    monkeypatch.setattr(lineup.ArrayTable, "update", counted)
+    for _ in range(2):  # a new crowd asks its poses for their shape and place
+        drawn = lineup.lineup(scene.actors, options, drawn)
+    compared.clear()
+    for _ in range(3):
+        drawn = lineup.lineup(scene.actors, options, drawn)
+    assert not compared
+    scene.actors[7].placement[0, 3] += 1.0
+    lineup.lineup(scene.actors, options, drawn)
+    assert compared == [20] * 4  # poses and placements, as meshes and as joints
+
+
 def test_frames_of_200_actors_call_no_more_functions_than_those_of_20(offscreen):
     size, options, calls = (16, 12), DisplayOptions(quality="normal"), {}
 

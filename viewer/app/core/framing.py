@@ -17,6 +17,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import bounding_box
 from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor, Scene, Shown, points_of_scenes, pose_actors
+from viewer.rigs.watched_arrays import unwatched
 
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
@@ -227,7 +228,7 @@ def _own_shape(actor: Actor) -> bytes:
 
 def _own_motion(actor: Actor) -> tuple[object, ...]:
     """Return a key of an actor's motion and placement; edited clips are new objects."""
-    return actor.clip, actor.offset, actor.placement.tobytes()
+    return actor.clip, actor.offset, unwatched("placement")(actor).tobytes()
 
 
 def _n_points(scene: Scene) -> int:

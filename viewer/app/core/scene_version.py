@@ -13,6 +13,7 @@ from viewer.rigs.memo import NumberKey
 from viewer.rigs.pose import PoseKey, pose_key
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.scene import Actor, Motion, Scene, Swinging
+from viewer.rigs.watched_arrays import unwatched
 
 
 class ActorVersion(NamedTuple):  # a tuple is compared quickly, also for hundreds of actors
@@ -82,7 +83,7 @@ def _version_of(actor: Actor, last: ActorVersion | None) -> ActorVersion:
         actor.animation,
         actor.springs,
         actor.drive,
-        placement.updated(actor.placement),
+        placement.updated(unwatched("placement")(actor)),
         points,
     )
     return last if last is not None and last == now else now
