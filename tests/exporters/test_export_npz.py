@@ -56,7 +56,7 @@ def test_reduced_weights_are_reported(tmp_path):
     still = f"{path}: vertices differ from the pose by up to 1 m (vertex 3): only the strongest "
     assert faults.lines(export(actor, path, how))[1].startswith(still)
     animation, options = single_frame(actor, number=7), ExportOptions(up="z", skinning=how)
-    _, note = faults.lines(export_frames(animation, path, "npz", options))
+    note = faults.lines(export_frames(animation, path, "npz", options))[1]
     moving = "vertices differ from the motion by up to 1 m (vertex 3, frame 7): only the strongest"
     assert note.startswith(f"{path}: {moving}")
 
@@ -130,10 +130,11 @@ def test_equal_poses_are_written_as_equal_bytes(tmp_path):
 
 
 def test_arrays_are_listed(tmp_path):
-    (note,) = export(seamed_actor(), tmp_path / "out.npz")
+    note, lost = export(seamed_actor(), tmp_path / "out.npz")
     assert (note.key, note.path) == ("X001.arrays", tmp_path / "out.npz")
     first = ["name", "up", "unit", "vertices", "normals", "triangles"]
     assert note.values["names"][:6] == first
+    assert faults.lines([lost]) == ["not stored in .npz: the skin"]
 
 
 # Captured points

@@ -14,11 +14,13 @@ from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
 from rigs import hand_made
+from seamed import seamed_actor
 from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_animation
 
 import viewer
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions, export
+from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.mesh import Mesh
@@ -31,6 +33,7 @@ from viewer.rigs.motion.sampled_animation import (
 )
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.transform_clip import Animation
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import ball_skeleton
 from viewer.rigs.skin import skin_from_lists
@@ -53,6 +56,24 @@ def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
                 place += f", frame {far['frame']}" if "frame" in far else ""
                 found[what] = (1000.0 * METRES[far["unit"]] * far["distance"], place)
     return found
+
+
+@pytest.mark.parametrize(
+    ("name", "lost"),
+    [
+        ("out.obj", ["the skeleton", "the skin"]),
+        ("out.ply", ["the skeleton", "the skin"]),
+        ("out.npz", ["the skin"]),
+        ("out.skel", []),
+    ],
+)
+def test_files_of_one_pose_name_the_parts_of_the_rig_that_they_cannot_hold(tmp_path, name, lost):
+    figure = seamed_actor(blend_shapes=BlendShapes(("peak",), np.ones((1, 5, 3)))).figure
+    moves = tuple(Animation(each, 0.0, 1.0, pytest.fail) for each in ("go", "stop"))
+    notes = export(Actor(replace(figure, animations=moves)), tmp_path / name)
+    (note,) = (note for note in notes if note.key == "X003.parts")
+    lost = [*lost, "1 blend shape (the current shape is kept)", "2 animations"]
+    assert [part for part in note.values["parts"] if part in lost] == lost
 
 
 def errors(notes: list[Diagnostic]) -> list[Diagnostic]:

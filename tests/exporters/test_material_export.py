@@ -119,6 +119,8 @@ def test_material_libraries_round_trip(tmp_path):
     assert (lost.values["format"], [part.sentence for part in lost.values["parts"]]) == (
         ".obj and .mtl",
         [
+            "the skeleton",
+            "the skin",
             "occlusion maps",
             "single-sided surfaces",
             "second texture coordinates",

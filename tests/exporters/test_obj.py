@@ -51,7 +51,10 @@ def test_mesh_at_rest_round_trips(tmp_path):
     assert_array_equal(obj.v, POSITIONS)
     assert_array_equal(obj.vt, UVS)
     assert_array_equal(corners(obj), [TRIANGLES, UV_TRIANGLES, TRIANGLES])
-    assert notes == [f"{tmp_path / 'out.obj'}: 5 vertices, 3 triangles"]
+    assert notes == [
+        f"{tmp_path / 'out.obj'}: 5 vertices, 3 triangles",
+        "not stored in .obj and .mtl: the skeleton, the skin",
+    ]
     assert names(tmp_path) == ["out.obj"]
 
 

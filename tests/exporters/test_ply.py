@@ -58,7 +58,10 @@ def test_mesh_round_trips(tmp_path):
     normals = [[0, 0, 1], [0, 0.6, 0.8], [1, 0, 0], [0, 0, -1], [0, 1, 0]]
     assert_allclose(columns(vertices, "nx", "ny", "nz"), normals, rtol=0, atol=FLOAT32)
     assert_array_equal([face["vertex_indices"] for face in faces], TRIANGLES)
-    assert notes == [f"{tmp_path / 'out.ply'}: 5 vertices, 3 triangles"]
+    assert notes == [
+        f"{tmp_path / 'out.ply'}: 5 vertices, 3 triangles",
+        "not stored in .ply: the skeleton, the skin",
+    ]
 
 
 def test_corners_have_texture_coordinates_also_along_seams(tmp_path):
@@ -96,7 +99,7 @@ def test_textures_are_left_out(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     notes = export(seamed_actor(mesh=mesh), tmp_path / "out.ply")
     assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]
-    values = {"format": ".ply", "parts": ["materials and textures"]}
+    values = {"format": ".ply", "parts": ["the skeleton", "the skin", "materials and textures"]}
     assert [(note.key, note.values) for note in notes[1:]] == [("X003.parts", values)]
 
 
@@ -108,7 +111,7 @@ def test_colours_of_vertices_are_written_as_srgb(tmp_path):
     vertices = read_ply(tmp_path / "out.ply").elements["vertex"]
     found = columns(vertices, "red", "green", "blue", "alpha")
     assert_allclose(found[:2], [[255, 127.5, 187.5, 255], [0, 255, 10.3, 51]], atol=0.6)
-    assert len(notes) == 1
+    assert faults.lines(notes[1:]) == ["not stored in .ply: the skeleton, the skin"]
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "end_header\n", "é\udcff 文", "", "x" * 5000, "\r"])

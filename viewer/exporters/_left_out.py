@@ -33,6 +33,27 @@ def extra_parts(figure: Figure) -> list[Phrase]:
     return [Phrase(name) for name, part in extras.items() if part is not None]
 
 
+def shape_parts(figure: Figure) -> list[Phrase]:
+    """Return the blend shapes of a figure that is written in its current shape."""
+    if figure.blend_shapes is None:
+        return []
+    n_shapes = counted(figure.n_shapes, "blend shape")
+    return [Phrase("{n} (the current shape is kept)", n=n_shapes)]
+
+
+def animation_parts(figure: Figure) -> list[Phrase]:
+    """Return the animations of a figure that is written in one pose."""
+    n_animations = len(figure.animations)
+    return [Phrase("{n}", n=counted(n_animations, "animation"))] if n_animations else []
+
+
+def rig_parts(figure: Figure) -> list[Phrase]:
+    """Return what moves a figure, which files of posed vertices cannot hold."""
+    parts = {"the skeleton": figure.skeleton, "the skin": figure.skin}
+    held = [Phrase(name) for name, part in parts.items() if part is not None]
+    return held + shape_parts(figure)
+
+
 def surface_parts(mesh: Mesh, has_colors: bool = False, has_parts: bool = False) -> list[Phrase]:
     """Return the data of a mesh that formats with one set of texture coordinates cannot hold."""
     extras = {

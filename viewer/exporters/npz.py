@@ -24,10 +24,16 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, note
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._exporter import Selection
 from viewer.exporters._gaps import kept_gaps
+from viewer.exporters._left_out import (
+    animation_parts,
+    not_held_note,
+    shape_parts,
+    surface_parts,
+)
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import QUATERNIONS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
@@ -37,6 +43,7 @@ from viewer.phrases import all_of, counted, optional
 from viewer.rigs.arrays import Arrays, Bools, Deferred, Floats
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.captures.sampled_points import SampledPoints
+from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
 from viewer.rigs.motion.evaluation import pose_of, world_frames
@@ -87,7 +94,18 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     return [
         note("X001.arrays: arrays {names}", path, names=all_of([*arrays])),
         *notes,
+        *not_held_note(".npz", [*_lost(figure), *animation_parts(figure)]),
     ]
+
+
+def _lost(figure: Figure) -> list[Phrase]:
+    """Return the parts of a figure that have no array."""
+    lost = [Phrase("the skin")] if figure.skin is not None else []
+    lost += shape_parts(figure)
+    if figure.mesh is not None:
+        lost += [Phrase("materials and textures")] if figure.mesh.materials else []
+        lost += surface_parts(figure.mesh)
+    return lost
 
 
 def _export_frames(
@@ -137,7 +155,8 @@ def _export_frames(
         errors = _motion_losses(animation, open_archive(Source(path, saved[path])), path, options)
     counts = _counts(frames.present, animation.frame_rate)
     sentence = "X001.motion-arrays: {n} at {rate:g} fps{missing}: {names}"
-    return [note(sentence, path, **counts, names=all_of([*arrays])), *filling, *errors]
+    written = note(sentence, path, **counts, names=all_of([*arrays]))
+    return [written, *filling, *errors, *not_held_note(".npz", _lost(figure))]
 
 
 def _motion_losses(

@@ -15,7 +15,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.exporters._exporter import Selection, require_mesh
 from viewer.exporters._gaps import kept_gaps
-from viewer.exporters._left_out import not_held_note, surface_parts
+from viewer.exporters._left_out import animation_parts, not_held_note, rig_parts, surface_parts
 from viewer.exporters._losses.pose_errors import PoseLosses, look_at_mesh
 from viewer.exporters._motion_paths import numbered_paths
 from viewer.exporters._options import ExportOptions
@@ -67,7 +67,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         *odd,
         *losses.notes(path),
     ]
-    return notes + _changed(figure)
+    return notes + _changed(figure, animation_parts(figure))
 
 
 def _export_frames(
@@ -145,8 +145,8 @@ def _write(
     ]
 
 
-def _changed(figure: Figure) -> list[Diagnostic]:
-    """Return notes about data that is written in another form, or not at all."""
+def _changed(figure: Figure, others: Sequence[Phrase] = ()) -> list[Diagnostic]:
+    """Return notes about data that is written in another form, or, as ``others``, not at all."""
     mesh, notes = figure.require_mesh(), list[Diagnostic]()
     polygons = dict(figure.facts).get("polygons")
     if polygons is not None:
@@ -171,7 +171,7 @@ def _changed(figure: Figure) -> list[Diagnostic]:
                 names=listed(renamed, 8),
             )
         )
-    lost = _library_losses(mesh)
+    lost = [*rig_parts(figure), *others, *_library_losses(mesh)]
     extra = surface_parts(mesh, has_colors=True, has_parts=True)
     lost += [part for part in extra if part not in lost]
     return notes + not_held_note(".obj and .mtl", lost)

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.exporters._exporter import Selection, require_mesh
-from viewer.exporters._left_out import not_held_note, surface_parts
+from viewer.exporters._left_out import animation_parts, not_held_note, rig_parts, surface_parts
 from viewer.exporters._losses.pose_errors import mesh_losses
 from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, save_bytes
@@ -57,7 +57,8 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         "vertices": counted(mesh.n_vertices, "vertex"),
         "triangles": counted(mesh.n_triangles, "triangle"),
     }
-    lost = [Phrase("materials and textures")] if mesh.materials else []
+    lost = rig_parts(actor.figure) + animation_parts(actor.figure)
+    lost += [Phrase("materials and textures")] if mesh.materials else []
     lost += surface_parts(mesh, has_colors=True)
     notes = [note(wording.MESH, path, **counts), *errors]
     if kind == "double":

@@ -13,7 +13,12 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
 from viewer.exporters._exporter import Selection
-from viewer.exporters._left_out import extra_parts, not_held_note
+from viewer.exporters._left_out import (
+    animation_parts,
+    extra_parts,
+    not_held_note,
+    shape_parts,
+)
 from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
@@ -207,18 +212,14 @@ def scaled(figure: Figure, factor: float) -> Figure:
 
 def _lost(figure: Figure) -> list[Diagnostic]:
     """Return a note that lists the data that the formats cannot store."""
-    lost = []
-    if figure.blend_shapes is not None:
-        lost.append(
-            Phrase("{n} (the current shape is kept)", n=counted(figure.n_shapes, "blend shape"))
-        )
+    lost = shape_parts(figure)
     if figure.correctives is not None:
         lost.append(Phrase("pose correctives"))
     if figure.mesh is not None:
         lost += lost_parts(figure.mesh)
     if figure.up != "y":
         lost.append(Phrase("the up axis {up}", up=figure.up))
-    return not_held_note(".skel and .skin", [*lost, *extra_parts(figure)])
+    return not_held_note(".skel and .skin", [*lost, *extra_parts(figure), *animation_parts(figure)])
 
 
 def _error(
