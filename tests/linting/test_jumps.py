@@ -1,7 +1,8 @@
-"""Jumps of the root that are slower than the limit of all joints."""
+"""Jumps of the root that are slower than the limit of all joints, and joints that keep turning."""
 
 import numpy as np
 import pytest
+from linting.planted import limited_in_degrees
 from linting.sound import column
 
 from viewer.linting import LintOptions, lint_scene
@@ -46,7 +47,26 @@ def test_repeated_frames_are_no_jumps():
     assert jumps_of(20.0 / RATE * (np.arange(40) // 2)) == []
 
 
+@pytest.mark.parametrize("held", [12, 20])
+def test_poses_that_are_held_throughout_are_blocked_on_purpose(held):
+    assert jumps_of(6.0 / RATE * (np.arange(100) // held)) == []
+
+
+def test_a_root_that_is_displaced_twice_jumps_twice():
+    assert jumps_of(6.0 / RATE * (np.arange(100) // 40)) == [[20, 40]]
+
+
 def test_a_given_limit_replaces_that_of_jumps():
     places = np.where(np.arange(40) < 20, 0.0, 20.0 / RATE)
     assert jumps_of(places, LintOptions(max_speed=25.0)) == []
     assert jumps_of(places, LintOptions(max_speed=15.0)) == [[10]]
+
+
+@pytest.mark.parametrize(("turns", "codes"), [(0.3, ["S014"]), (5.0, [])])
+def test_wide_limits_are_those_of_a_wheel_if_the_motion_turns_it(turns, codes):
+    """Limits from -10 to 140 about z; the joint turns within 10 s."""
+    linear = (("linear", "linear"),) * 2
+    turning = Channel(8, np.array([0.0, 10.0]), np.array([0.0, 2.0 * np.pi * turns]), linear)
+    clip = Clip("a", (turning,), 0.0, 10.0)
+    found = lint_scene(Scene([Actor(limited_in_degrees(), clip=clip)]))
+    assert [one.code for one in found if one.code == "S014"] == codes

@@ -125,7 +125,9 @@ CODES: dict[str, Code] = {
     "S011": Code("warning", "bone without length", "move the joint to the end of its bone"),
     "S012": Code("warning", "joint outside the mesh", "move the joint into the limb"),
     "S013": Code("warning", "upside-down rig", "rotate the figure, or correct its up axis"),
-    "S014": Code("warning", "rotation limits in degrees", "write them in radians"),
+    "S014": Code(
+        "warning", "rotation limits in degrees", "write them in radians, or none for wheels"
+    ),
     # Meshes and their symmetry
     "M001": Code("warning", "degenerate triangles", "merge their corners or delete them"),
     "M002": Code("warning", "flipped triangles", "reverse their winding"),

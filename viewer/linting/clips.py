@@ -33,6 +33,7 @@ _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in betwee
 # A body that shifts in one frame, and rests before and after, has not moved: falls accelerate.
 _STEP = 0.04  # minimum length, relative to the size: 70 mm for a person
 _STILL, _BESIDE = 0.1, 4  # maximum length of steps beside it, relative to it, and their number
+_POSES = 3  # minimum number of changes between held poses that are a motion
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
@@ -146,6 +147,8 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     speeds[track.stepped] = 0.0
     fast = _too_fast(track, speeds, limit)
     if fast is None and given is None:
+        if _is_blocked(track):
+            return
         limit = _LEAPS * track.size
         rows = track.on_frames()
         flat = [axis for axis in range(3) if axis != (2 if subject.up == "z" else 1)]
@@ -209,6 +212,16 @@ def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
         times=track.times[each],
         at=("frames", first),
     )
+
+
+def _is_blocked(track: Track) -> bool:
+    """Return whether all poses are held: stepped on purpose, as animators block a motion."""
+    rows = track.on_frames()
+    moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2).max(axis=1)
+    changes = moves > _ROUNDING * track.size
+    is_held = not (changes[1:] & changes[:-1]).any()
+    # A body at rest that is displaced, and maybe returns, is not blocked.
+    return is_held and int(changes.sum()) >= _POSES
 
 
 def _leaps(speeds: Floats, carriers: Ints) -> Floats:

@@ -104,6 +104,15 @@ def _rest(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
         )
 
 
+def _spinning(subject: Subject) -> list[int]:
+    """Return the DOFs that the motion rotates by more than two turns, as those of wheels."""
+    clip = subject.actor.joint_motion
+    if clip is None or clip.kind != "curves":
+        return []
+    turned = {one.target: np.ptp(one.values) for one in clip.channels if len(one.values)}
+    return [target for target, angle in turned.items() if angle > _TURNS[0]]
+
+
 def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator[Finding]:
     facts = [fact for _, fact in subject.actor.figure.facts if isinstance(fact, Diagnostic)]
     for fact in facts:
@@ -134,7 +143,8 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator
             )
     rotates = skeleton.dof_kinds >= FIRST_ROTATION
     sizes = np.where(rotates[:, None], np.abs(skeleton.dof_limits), 0.0)
-    degrees = np.flatnonzero(((sizes > _TURNS[0]) & (sizes <= _TURNS[1])).any(axis=1))
+    wide = ((sizes > _TURNS[0]) & (sizes <= _TURNS[1])).any(axis=1)
+    degrees = np.setdiff1d(np.flatnonzero(wide), _spinning(subject))
     if len(degrees):
         first = int(degrees[0])
         yield subject.found(
