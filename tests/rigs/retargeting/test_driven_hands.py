@@ -199,6 +199,31 @@ def test_hands_are_moved_out_of_a_stout_body(is_shaped):
     assert "--hand-contact off disables this" in text
 
 
+def test_hands_that_are_free_in_the_source_are_moved_out_of_a_stout_body():
+    # The wrists of the source are 0.4 m from its thighs, those of the figure inside the thighs of
+    # the same person with a radius of 0.5 m.
+    source, stout = motion(0.0, 0.0, down=1.0), stout_figure(50.0)
+    found = retarget(source, stout, source_rest="auto")
+    clip, changes = keep_hands(found, found.clip, stout)
+    assert changes.before == 0.0
+    before, after = (
+        np.linalg.norm(from_thigh(places(stout, each)), axis=1) for each in (found.clip, clip)
+    )
+    assert before.max() < 50.0 - TIP
+    # The points of the skin are 3.8 cm apart here, the farthest from them 2.7 cm from the nearest,
+    # and a corner that is less than tan(30 degrees) of this deep, 1.6 cm, is not noticed.
+    assert after.min() > 50.0 * np.cos(np.pi / 24.0) - 1.6 - 0.4
+    # The points of the other hand are others.
+    largest = np.linalg.norm(moved(stout, found.clip, clip), axis=1).max()
+    assert_allclose(changes.moved_out, largest, rtol=1e-3)
+
+
+def moved(figure, *clips):
+    """Return how far the left wrist is in the second clip from the first: (N, 3)."""
+    before, after = (places(figure, each)["LeftHand_"] for each in clips)
+    return after - before
+
+
 def test_distance_that_short_arms_cannot_reach_is_reported():
     # The straight arms of 54 cm of the source end beside the thighs. Those of the figure are half
     # as long, from the same shoulders, so that 27 cm are missing in every frame.

@@ -168,7 +168,11 @@ def keep_hands(
     before, least = (_error(each, nearness) for each in (shifts, _out_of_reach(body, shifts)))
     touches = any((np.linalg.norm(shift, axis=1) > _SLACK).any() for shift in shifts)
     # The proportions of the source are left alone: what its hands enter, it entered.
-    differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
+    places = [each.at(arm[2]) - each.at("pelvis") for arm in _ARMS for each in (body, other)]
+    differs = any(
+        (np.linalg.norm(own - theirs @ found.to_target.T, axis=1) > _SHORT).any()
+        for own, theirs in zip(places[::2], places[1::2], strict=True)
+    )
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
     shifts = [
