@@ -560,7 +560,8 @@ def bvh_faults(who: Character, r: Roles, rng: np.random.Generator) -> Iterator[F
     yield Fault("implausible frame time", "C017", [changed("step", 33.3), changed("step", 1e-5)])
     yield Fault("name twice", "S006 F007", [
         lambda one: one.names.__setitem__(who[r.elbow], who.names[who[r.knee]])])  # fmt: skip
-    yield Fault("rotation not a number", "F003", [
+    # In a BVH file, a frame with numbers that are not finite is a gap of the recording.
+    yield Fault("rotation not a number", "C005", [
         lambda one: one.rotations.__setitem__((5, who[r.elbow]), np.nan)])  # fmt: skip
 
 
