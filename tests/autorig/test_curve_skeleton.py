@@ -417,7 +417,8 @@ def test_more_loops_than_are_cut_are_reported(monkeypatch):
 
 @pytest.mark.parametrize(
     ("up", "turned", "front"),
-    [("y", np.eye(3), "+z"), ("y", turn([0, 1, 0], np.pi / 2), "+x"),
+    [("x", turn([0, 0, 1], -np.pi / 2), "+z"), ("y", np.eye(3), "+z"),
+     ("y", turn([0, 1, 0], np.pi / 2), "+x"),
      ("z", turn([1, 0, 0], np.pi / 2), "-y"),
      ("z", turn([0, 0, 1], np.pi / 2) @ turn([1, 0, 0], np.pi / 2), "+x")],
 )  # fmt: skip

@@ -681,7 +681,7 @@ def find_skeleton(
         raise RigError("expected a target with triangles, found none")
     named = alignment.up or source.up
     # Any axis beside the up axis is a front; the usual ones are those of figures.
-    usual = "z" if named[-1] == "y" else "x"
+    usual = "x" if named[-1] == "z" else "z"
     front = alignment.facing or usual
     axis_rotations(source.up, named, front)  # checks the names
     with part_of_work(span=(0.0, 0.4)):
