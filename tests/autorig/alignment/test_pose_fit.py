@@ -15,7 +15,7 @@ from viewer.autorig.alignment.pose_fit import (
     solve_step,
     start_of,
 )
-from viewer.autorig.alignment.proportions import limbs_of, resized
+from viewer.autorig.alignment.proportions import _sides, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.progress import receiving
 from viewer.rigs.geometry.closest_point import Surface
@@ -105,9 +105,10 @@ LAID = AlignedTemplate(
     vertex_normals(X, FIGURE.mesh.triangles),
     np.array([[0.0, 0, 0], [0, 1, 0]]),
     LIMBS.axes,
+    LIMBS.sides,
 )
 SIZE = 2.4
-NONE = np.zeros((2, 3)), np.zeros((2, 2))
+NONE = np.zeros((2, 3)), np.zeros((3, 2))
 
 
 def solved(targets, scales=True, before=NONE):
@@ -141,9 +142,17 @@ def test_longer_limb_is_distinguished_from_overall_scale():
     # The base is 5 % longer; its vertices stretch, and the tip moves with it.
     up = 0.05 * ((1 - fraction) * X[:, 1] + fraction)
     step = solved(X + up[:, None] * [0.0, 1.0, 0.0])
-    along, across = step.limb_growths + step.growth
+    along, *across = step.limb_growths + step.growth
     assert_allclose(along[0] - along[1], 0.05, atol=5e-3)
-    assert_allclose(across[0], 0.0, atol=5e-3)
+    assert_allclose(np.array(across)[:, 0], 0.0, atol=5e-3)
+
+
+def test_wide_limb_is_distinguished_from_a_deep_one():
+    # Axes and sides are along y and x, or nearly for the tip, so z is the third axis.
+    assert_allclose(LIMBS.sides[0], [1, 0, 0], atol=1e-12)
+    _, side, third = (lambda step: step.limb_growths + step.growth)(solved(X * [1.05, 1, 0.95]))
+    assert_allclose(side, 0.05, atol=5e-3)
+    assert_allclose(third, -0.05, atol=5e-3)
 
 
 def test_known_scale_is_not_changed():
@@ -164,7 +173,7 @@ def test_unsupported_rotations_of_earlier_iterations_decay():
     # is only one pair, which does not constrain the tip.
     pairs = Pairs(np.array([0]), X[:1], np.array([[0.0, 0, 1.0]]), np.array([0]), X[:1])
     rotated = np.array([[0.0, 0, 0], [0, 0.1, 0]])
-    step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((2, 2)), True)
+    step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((3, 2)), True)
     # The penalties are 3e-6 on the total rotation and 1e-5 on one step, so 0.1 * 3 / 13 is
     # reverted.
     assert step.rotation_vectors[1, 1] == pytest.approx(-0.1 * 3 / 13, rel=1e-6)
@@ -222,6 +231,25 @@ def test_girth_scale_keeps_the_length():
     low = figure.mesh.positions[:, 1] < 0.79
     assert_allclose(thick.mesh.positions[low], figure.mesh.positions[low] * [3, 1, 3], atol=1e-12)
     assert_allclose(thick.skeleton.rest_translations[1], [0, 1, 0], atol=1e-12)
+
+
+def test_girths_differ_in_the_two_directions_across_a_limb():
+    figure = arm()
+    girths = np.array([3.0, 1.0]), np.array([0.5, 1.0])
+    flat = resized(figure, limbs_of(figure), ONES, *girths)
+    low = figure.mesh.positions[:, 1] < 0.79
+    assert_allclose(flat.mesh.positions[low], figure.mesh.positions[low] * [3, 1, 0.5], atol=1e-12)
+    assert_allclose(flat.skeleton.rest_translations[1], [0, 1, 0], atol=1e-12)
+
+
+def test_sides_of_mirrored_limbs_are_mirrored():
+    # Rounding makes x the axis most across one limb and z that of the other.
+    axes = np.array([[0.1, 1.0, 0.1 + 1e-9], [-0.1 - 1e-9, 1.0, 0.1], [0.0, 0.0, 0.0]])
+    axes[:2] /= np.linalg.norm(axes[:2], axis=1, keepdims=True)
+    sides = _sides(axes, np.array([1, 0, 2]))
+    assert_allclose(sides[0], sides[1] * np.sign(sides[0] * sides[1]), atol=1e-8)
+    assert_allclose(np.einsum("ja,ja->j", sides, axes), 0.0, atol=1e-12)
+    assert_allclose(np.linalg.norm(sides, axis=1), [1, 1, 0], atol=1e-12)
 
 
 def test_offsets_follow_a_rotated_bind_pose():

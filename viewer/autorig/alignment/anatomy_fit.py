@@ -169,7 +169,8 @@ def _start(
     ) - np.log(fitted.similarity.scale)
     # Landmarks have no radius.
     seen = replace(limbs, weights=limbs.weights[:count])
-    grown = np.stack([fitted.grown[0], _girths(marked, seen, ratios)])
+    girths = _girths(marked, seen, ratios)
+    grown = np.stack([fitted.grown[0], girths, girths])
     fitted = replace(fitted, grown=grown, figure=resized(few, limbs, *np.exp(grown)))
     # Thicker limbs move the points near their ends a little.
     fitted = fit_marks(few, fitted, limbs, alone, size)

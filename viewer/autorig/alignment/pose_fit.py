@@ -7,17 +7,18 @@ for lowered and outstretched arms, and come closer with every iteration.
 
 One iteration solves a linear problem for joint rotations and limb scales. With x a vertex aligned
 with the target, m the mean of all x, c_j a joint, w_vj the weight of vertex v, s_vj the sum of its
-weights for joint j and all below it, and P_j the projection onto the limb's axis::
+weights for joint j and all below it, and P_j, Q_j and R_j the projections onto the limb's axis and
+the two axes across it::
 
     e_j = w_vj (x - c_j) + sum over joints k directly below j of s_vk (c_k - c_j)
     x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
-            + sum_j (l_j P_j + g_j (1 - P_j)) e_j
+            + sum_j (l_j P_j + g_j Q_j + h_j R_j) e_j
 
-The rotations w_j, the growths l_j along and g_j across the limbs, and w, t and u of the whole
-figure minimise the mean of::
+The rotations w_j, the growths l_j along and g_j and h_j across the limbs, and w, t and u of the
+whole figure minimise the mean of::
 
     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
-    h |x' - q|^2        over vertices and the target's points closest to them, in any direction
+    f |x' - q|^2        over vertices and the target's points closest to them, in any direction
 
 The second sum constrains the ends of limbs, which planes do not. Marks, vertices whose positions in
 the target are known, add a third sum of |x' - q|^2. All lengths are divided by the target's size.
@@ -62,7 +63,7 @@ _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 _STILL = 2e-3  # rotation in radians; iterations end when no joint rotates by more
 _FEWEST = 50  # minimum number of pairs for fitting a pose
 _SMALLEST, _LARGEST = np.log(0.2), np.log(5.0)  # limits of the logarithms of limb scales
-_HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
+_HOLD = 0.2  # f: weight of point-to-point relative to point-to-plane distances
 
 # Penalties on the squares of total rotations (radians) and total growths (logarithms).
 _ROTATED, _GROWN = 3e-6, 3e-5
@@ -90,7 +91,7 @@ class Fitted:
     rotated: Floats
     """(J, 3). Total rotation vectors of the joints, radians."""
     grown: Floats
-    """(2, J). Logarithms of the scales along and across the limbs."""
+    """(3, J). Logarithms of the scales along the limbs, their sides and the third axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +118,7 @@ class Marks:
 def start_of(template: Figure, pose: Pose, similarity: Similarity) -> Fitted:
     """Return the state before any fit."""
     n_joints = template.require_skeleton().n_joints
-    zeros = np.zeros((n_joints, 3)), np.zeros((2, n_joints))
+    zeros = np.zeros((n_joints, 3)), np.zeros((3, n_joints))
     return Fitted(template, pose.copy(), similarity, *zeros)
 
 
@@ -181,10 +182,12 @@ def _aligned_template(state: Fitted, limbs: Limbs) -> AlignedTemplate:
     posed = move(mesh.positions, skin, palette)[0]
     positions = state.similarity.apply(apply_transform(place, posed))
     joints = state.similarity.apply(apply_transform(place, world[:, :3, 3]))
-    axes = (
-        unit(np.einsum("jab,jb->ja", palette[:, :3, :3], limbs.axes)) @ state.similarity.rotation.T
+    axes, sides = (
+        unit(np.einsum("jab,jb->ja", palette[:, :3, :3], own)) @ state.similarity.rotation.T
+        for own in (limbs.axes, limbs.sides)
     )
-    return AlignedTemplate(positions, vertex_normals(positions, mesh.triangles), joints, axes)
+    normals = vertex_normals(positions, mesh.triangles)
+    return AlignedTemplate(positions, normals, joints, axes, sides)
 
 
 def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -> Pairs:
@@ -260,7 +263,8 @@ class AlignedTemplate:
     """(V, 3). Vertices of the template."""
     joints: Floats
     axes: Floats
-    """(J, 3). Joints of the template, and unit vectors along their limbs."""
+    sides: Floats
+    """(J, 3). Joints of the template, and unit vectors along and across their limbs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,7 +305,7 @@ class PoseStep:
     rotation_vectors: Floats
     """(J, 3). Rotation vectors of the joints; 0 for roots, which rotate with the whole figure."""
     limb_growths: Floats
-    """(2, J). Logarithms of the limbs' scales: along, across."""
+    """(3, J). Logarithms of the limbs' scales, as in ``Fitted.grown``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -326,7 +330,7 @@ def solve_step(
     scales: bool,
     marks: Marks | None = None,
 ) -> PoseStep:
-    """Solve the linear problem above after rotations (J, 3) and growths (2, J) in total.
+    """Solve the linear problem above after rotations (J, 3) and growths (3, J) in total.
 
     Without ``pairs``, only the marks count.
     """
@@ -336,7 +340,7 @@ def solve_step(
     assert known is not None  # one of them is given
     middle = aligned.positions[known].mean(axis=0)
     frame = _Frame(middle, size, aligned, limbs, parents)
-    count = 7 + 3 * len(below) + 2 * n_joints
+    count = 7 + 3 * len(below) + 3 * n_joints
     matrix, right = np.zeros((count, count)), np.zeros(count)
     if pairs is not None:
         matrix, right = _equations(frame, pairs.vertices, pairs.targets, pairs.normals)
@@ -362,7 +366,7 @@ def solve_step(
     now = np.full(len(right), _NOW)
     now[:7] = _WHOLE
     if not scales:
-        now[6], now[-2 * n_joints :] = _FIXED, _FIXED
+        now[6], now[-3 * n_joints :] = _FIXED, _FIXED
     solved = np.asarray(np.linalg.solve(matrix + np.diag(now), right), dtype=np.float64)
     rotations = np.zeros((n_joints, 3))
     rotations[below] = solved[7 : 7 + 3 * len(below)].reshape(-1, 3)
@@ -370,7 +374,7 @@ def solve_step(
     # on.
     angles = np.linalg.norm(rotations, axis=1, keepdims=True)
     rotations = rotations * (_MOST / np.maximum(angles, _MOST))
-    growths = np.clip(solved[-2 * n_joints :].reshape(2, -1), -_GROWTH, _GROWTH)
+    growths = np.clip(solved[-3 * n_joints :].reshape(3, -1), -_GROWTH, _GROWTH)
     growth = min(max(float(solved[6]), -_GROWTH), _GROWTH)
     return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
@@ -381,15 +385,15 @@ def _penalties(axes: Floats, n_joints: int, bending: float, twisting: float) -> 
     ``axes``: unit vectors along the limbs of the rotating joints, (R, 3).
     """
     count = len(axes)
-    penalties = np.diag(np.repeat([bending, _GROWN], [3 * count, 2 * n_joints]))
+    penalties = np.diag(np.repeat([bending, _GROWN], [3 * count, 3 * n_joints]))
     # b |w|^2 + (t - b) (a . w)^2 for a rotation w of the limb with the axis a.
     own = (twisting - bending) * np.einsum("ja,jb->jab", axes, axes)
     for joint, block in enumerate(own):
         penalties[3 * joint : 3 * joint + 3, 3 * joint : 3 * joint + 3] += block
-    # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised. All limbs
-    # become thicker under clothes; otherwise the figure as a whole would grow instead, and extend
-    # beyond the target.
-    penalties[-n_joints:, -n_joints:] -= _GROWN / n_joints
+    # sum_j (g_j^2 + h_j^2) - (sum_j (g_j + h_j))^2 / 2J: only deviations from the mean girth are
+    # penalised. All limbs become thicker under clothes; otherwise the figure as a whole would grow
+    # instead, and extend beyond the target.
+    penalties[-2 * n_joints :, -2 * n_joints :] -= _GROWN / (2 * n_joints)
     return penalties
 
 
@@ -414,10 +418,16 @@ def _equations(
     rotating *= frame.limbs.fractions[vertices][:, below, None]
     reach = _reach(frame, vertices, spokes)
     across = np.einsum("na,nja->nj", normals, reach)
-    along = np.einsum("nja,ja->nj", reach, frame.aligned.axes) * (normals @ frame.aligned.axes.T)
+    along, wide = (
+        np.einsum("nja,ja->nj", reach, axes) * (normals @ axes.T)
+        for axes in (frame.aligned.axes, frame.aligned.sides)
+    )
     grow = np.einsum("na,na->n", normals, arms)[:, None]
     rows = np.concatenate(
-        [_cross(arms, normals), normals, grow, rotating.reshape(count, -1), along, across - along],
+        [
+            *(_cross(arms, normals), normals, grow, rotating.reshape(count, -1)),
+            *(along, wide, across - along - wide),
+        ],
         axis=1,
     )
     gaps = np.einsum("na,na->n", normals, targets - x) / frame.size

@@ -1,8 +1,9 @@
-"""Proportions of a figure: limbs scaled by one factor along their axes and one across them.
+"""Proportions of a figure: limbs scaled along their axes and in two directions across them.
 
 A joint's limb is the part of the body after it. Its vertices are moved, in the bind pose, by
-S_j (x - c_j) + c'_j, blended with the skin's weights; S_j = g_j I + (l_j - g_j) d_j d_j^T with
-the length l_j along the limb's axis d_j and the girth g_j across it. The joints below follow:
+S_j (x - c_j) + c'_j, blended with the skin's weights; S_j = h_j I + (l_j - h_j) d_j d_j^T +
+(g_j - h_j) s_j s_j^T with the length l_j along the limb's axis d_j, the girth g_j along an axis s_j
+across it, and the girth h_j along the third axis: chests are wide or deep. The joints below follow:
 c'_k = c'_j + S_j (c_k - c_j).
 """
 
@@ -33,6 +34,8 @@ class Limbs:
     """(V, J). Sums of the weights of a joint and all below it."""
     axes: Floats
     """(J, 3). Unit vectors along the limbs, in the bind pose; 0 for a joint without influence."""
+    sides: Floats
+    """(J, 3). Unit vectors across the limbs, near an axis of the figure; 0 where ``axes`` are."""
     partners: Ints
     """(J,). Mirror counterpart of each joint, or the joint itself."""
 
@@ -65,15 +68,31 @@ def limbs_of(figure: Figure) -> Limbs:
     except RigError:
         # The figure is not symmetric, so there is no symmetry to preserve.
         partners = np.arange(len(parents), dtype=np.int32)
-    return Limbs(weights, fractions, unit(ways), partners)
+    axes = unit(ways)
+    return Limbs(weights, fractions, axes, _sides(axes, partners), partners)
 
 
-def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
-    """Return a figure with limbs (J,) scaled along and across: mesh, bind pose, rest skeleton."""
+def _sides(axes: Floats, partners: Ints) -> Floats:
+    """Return a unit vector across each limb, mirrored for mirrored limbs: (J, 3)."""
+    # Figures are built along the axes of their frame, so trunks are wide and deep along these. The
+    # one most across both limbs of a pair serves both, whatever rounding made of their symmetry.
+    chosen = np.eye(3)[(np.abs(axes) + np.abs(axes[partners])).argmin(axis=1)]
+    across = chosen - np.einsum("ja,ja->j", chosen, axes)[:, None] * axes
+    return unit(np.where(axes.any(axis=1, keepdims=True), across, 0.0))
+
+
+def resized(
+    figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats, others: Floats | None = None
+) -> Figure:
+    """Return a figure with limbs (J,) scaled along and across: mesh, bind pose, rest skeleton.
+
+    ``others``: the girths along the third axes, by default those along ``Limbs.sides``.
+    """
     mesh, skeleton, skin = figure.attached()
-    scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
-        "ja,jb->jab", limbs.axes, limbs.axes
-    )
+    third = girths if others is None else others
+    scales = third[:, None, None] * np.eye(3)
+    for factors, axes in ((lengths, limbs.axes), (girths, limbs.sides)):
+        scales += (factors - third)[:, None, None] * np.einsum("ja,jb->jab", axes, axes)
     joints, parents = _bound_joints(skin), skeleton.parents
     below = np.flatnonzero(parents >= 0)
     moved = joints.copy()
