@@ -110,6 +110,15 @@ def test_axis_scales_keep_the_pose():
     assert found.pose is own and found.figure is figure
 
 
+def test_stretched_figure_is_found_without_being_asked_for(standing):
+    figure = standing[0]
+    factors = np.array([1.3, 1.0, 0.8])
+    target = mesh_of(figure.mesh.positions * factors, figure.mesh.triangles)
+    found, pose = aligned(figure, target)
+    assert found.pose is pose and found.figure is figure and found.alignment.how == "fit"
+    assert_allclose(found.alignment.similarity.linear, np.diag(factors), atol=0.003)
+
+
 def test_known_scales_are_not_searched():
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)

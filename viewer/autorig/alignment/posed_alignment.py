@@ -24,6 +24,7 @@ from viewer.autorig.alignment.anatomy_fit import (
     starts_of,
     template_body,
 )
+from viewer.autorig.alignment.axes_fit import fit_axes
 from viewer.autorig.alignment.icp import Cloud, Triangles, iterate
 from viewer.autorig.alignment.orientation_search import axis_direction, nearest_axis
 from viewer.autorig.alignment.pose_fit import Fitted, Marks, fit_pose, start_of
@@ -65,6 +66,7 @@ _KEPT, _PART_KEPT = 0.65, 0.5
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
 _ENOUGH = 0.03  # misfit of fitted limbs up to which no other alignment is tried
+_STRETCHES = 10  # number of iterations to stretch a template
 _ROUNDS = 30  # number of iterations to align the template facing the other way
 _FOUND = ("search", "in place")  # origins of alignments that were not given by the user
 
@@ -169,18 +171,34 @@ def align_posed(
             by_limbs = _fits_of_limbs(job, starts)
         found = _best_of_limbs(job, by_limbs)
         if found is not None and misfit(found.alignment, False) <= _ENOUGH:
-            return replace(found, solids=solids)
+            return replace(_stretched(job, ours, found) or found, solids=solids)
     with part_of_work(span=(0.5, 0.7)):
         rigid = align(ours, theirs, template.up, settings)
     kept = PosedAlignment(rigid, template, pose, posed, (), solids=solids)
     if misfit(rigid, rigid.away > PART) <= _CLOSE:
         return kept
+    if has_limbs and rigid.away <= PART and (found := _stretched(job, ours, kept)) is not None:
+        return found
     if has_limbs and not is_new and rigid.how in _FOUND:
         with part_of_work(span=(0.7, 0.8)):
             starts, solids = _starts(job, ours, theirs)
             by_limbs = _fits_of_limbs(job, starts)
     with part_of_work(span=(0.8, 1.0)):
         return replace(_best(job, ours, kept, by_limbs), solids=solids)
+
+
+def _stretched(job: _Job, ours: Posed, found: PosedAlignment) -> PosedAlignment | None:
+    """Return the template in the given pose, stretched, if that is the shape of the target.
+
+    Limbs of such a target are neither as long nor as thick as those of any posed figure.
+    """
+    exact = Triangles(ours.positions, ours.triangles, job.settings.samples)
+    start = found.alignment.similarity
+    stretched = fit_axes(exact, job.exact, start, _STRETCHES, rotations=True)
+    alignment = Alignment.of(exact, job.exact, stretched, "fit")
+    if misfit(alignment, False) > min(_CLOSE, misfit(found.alignment, False)):
+        return None
+    return PosedAlignment(alignment, job.template, job.pose, ours.positions, (), legs=found.legs)
 
 
 def keeps(settings: AlignmentSettings) -> bool:
