@@ -28,9 +28,10 @@ endif
 .PHONY: notebooks figure system clean
 
 # A window may open even if pictures cannot be drawn without one, so failures are ignored here.
+# Compiled files are kept, so that only the first start takes long.
 run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
-	@$(BIN)/viewer $(FILES)
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/viewer $(FILES)
 
 # Types are checked while the tests run, as mypy uses only one core.
 test: $(READY)
