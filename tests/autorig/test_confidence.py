@@ -98,11 +98,12 @@ def test_bones_outside_the_template_say_nothing_about_the_target():
 
 def test_legs_that_leave_their_bones_are_counted():
     # Bones are along x. One leg follows them; the other comes down along y, 2 long, and follows
-    # them for 1 only. Of its path from 0.45, after the foot, 12 of 26 points are within its radius.
+    # them for 1 only. Of its path from 0.45, after the foot, 12 of 26 points are within its radius,
+    # extended by a voxel of 0.05: of those 0.1 apart, also the one before the bend.
     straight = np.linspace([2.0, 0, 0], [0, 0, 0], 21)
     bent = np.concatenate([np.linspace([1.0, 2, 0], [1, 0, 0], 21), straight[11:]])
     limbs = [
-        Limb(points, np.full(len(points), 0.15), points[-1], 2.0) for points in (straight, bent)
+        Limb(points, np.full(len(points), 0.08), points[-1], 2.0) for points in (straight, bent)
     ]
     pairs = LimbPair((limbs[0], limbs[0])), LimbPair((limbs[0], limbs[1]))
     for legs, expected in ((pairs[:1], 1.0), (pairs, 0.5 + 6 / 26)):

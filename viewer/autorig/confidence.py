@@ -240,8 +240,8 @@ def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> t
             apart = leg.points[rows, None] - starts
             along = np.clip(np.einsum("nba,ba->nb", apart, ways) / squares, 0.0, 1.0)
             gaps = np.linalg.norm(apart - along[..., None] * ways, axis=2).min(axis=1)
-            # Radii are known to a voxel.
-            radii = np.maximum(leg.radii[rows], target.solid.spacing)
+            # Paths and radii are known to a voxel: shins of that thickness are left by the path.
+            radii = leg.radii[rows] + target.solid.spacing
             parts.append(float((gaps <= radii).mean()))
         followed.append(float(np.mean(parts)))
     if not followed:
