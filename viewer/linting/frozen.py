@@ -21,6 +21,7 @@ _STILL = 0.01  # maximum step of a frozen frame, relative to the median of the c
 # A joint that slows down evenly moves by 9, 7, 5, 3 and 1 units, so that its last step is 0.2 of
 # their median; one that stops within a frame moves by about that median.
 _ABRUPT, _BESIDE = 0.5, 5  # minimum ratio of that step, and the number of steps
+_MOVING = 0.5  # minimum step beside them that no slowing body makes, relative to that median
 _MOST_JOINTS = 0.5  # minimum fraction of the moving joints that stop and go on so
 # Frames that were replaced by copies of one hide the movement, which the body catches up within a
 # frame: most joints move by more than in any frame around, and together about as far as they move
@@ -89,6 +90,8 @@ def _is_frozen(turns: Floats, first: int, last: int, usual: float) -> bool:
     """Return whether still steps are no hold; turns (F, J) of all steps, and their median."""
     moving = turns[:, (turns > _ROUNDING).mean(axis=0) > _MOSTLY]
     before, after = moving[max(first - _BESIDE, 0) : first], moving[last : last + _BESIDE]
+    if min(turns[first - 1].mean(), turns[last].mean()) > _MOVING * usual:
+        return True
     if moving.shape[1] == 0:
         return False
     if _is_abrupt(before[::-1]) and _is_abrupt(after):
