@@ -1,10 +1,13 @@
 """``viewer.render`` with the settings of the command."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import viewer
 from viewer.cli import run
+from viewer.commands._pictures import display_options
 from viewer.errors import RigError, ViewerError
 from viewer.formats import Source
 from viewer.formats._references import read_picture
@@ -43,6 +46,16 @@ def test_time_poses_a_copy():
     ("settings", "message"),
     [
         ({"options": viewer.DisplayOptions(shading="nonsense")}, "^shading: no value .*phong, pbr"),
+        ({"shading": "nonsense"}, "^shading: no value .*phong, pbr"),
+        ({"shading": 3}, "^shading: no value .*phong, pbr"),
+        ({"wire": True}, "^render: no option is called wire; did you mean .*allowed: background"),
+        ({"wireframe": "yes"}, "^wireframe: expected bool, found str"),
+        ({"metallic": 2}, "^metallic: expected 0 to 1, found 2"),
+        ({"isolines": 3}, "^isolines: expected bool or None, found int"),
+        (
+            {"scalar": "weight:head", "scalar_range": (1, "2")},
+            "^scalar_range: expected two numbers",
+        ),
         ({"quality": "best"}, '^quality: no value "best"; there are 3: draft, normal, final'),
         ({"background": "blue"}, '^background: expected "gradient"'),
         ({"scalar": "weight:nobody"}, '^weight:nobody: no joint is called "nobody"'),
@@ -54,6 +67,20 @@ def test_time_poses_a_copy():
 def test_values_that_do_not_exist_are_named(settings, message):
     with pytest.raises(ViewerError, match=message):
         viewer.render(viewer.load(), SIZE, **settings)
+
+
+def test_every_display_option_is_a_keyword_of_the_same_effect():
+    scene, options = viewer.load(), viewer.DisplayOptions(quality="normal")
+    for each in dataclasses.fields(options):
+        value = getattr(options, each.name)
+        assert display_options("render", None, {each.name: value}) in (
+            options,
+            dataclasses.replace(options, shading="scalar"),
+        )
+    found = viewer.render(scene, SIZE, shading="normals", wireframe=True)
+    options.shading, options.wireframe = "normals", True
+    np.testing.assert_array_equal(found, viewer.render(scene, SIZE, options=options))
+    assert (found != viewer.render(scene, SIZE)).any()
 
 
 def test_unknown_joints_and_other_objects_are_refused():

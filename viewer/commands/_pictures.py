@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 from types import NoneType
 
@@ -19,8 +20,8 @@ from viewer.commands._scene import SceneOptions
 from viewer.commands._sequence import Request, parse_turntable
 from viewer.commands._view import ViewOptions, camera_of
 from viewer.errors import RigError, ViewerError
-from viewer.near_names import name_hint
-from viewer.phrases import printable
+from viewer.near_names import did_you_mean, name_hint
+from viewer.phrases import all_of, printable
 from viewer.rendering.camera import Camera
 from viewer.rendering.camera_views import with_cameras
 from viewer.rendering.gpu.program import SHADING_CHOICES
@@ -45,6 +46,7 @@ def render(
     scalar: str | None = None,
     background: str | None = None,
     quality: Quality | None = None,
+    **settings: object,
 ) -> Bytes:
     """Draw a scene or one actor without a window.
 
@@ -77,6 +79,8 @@ def render(
         ``"gradient"``, ``"white"``, ``"environment"``, ``"transparent"`` or ``"#rrggbb"``.
     quality : "draft", "normal" or "final", optional
         Without or with shadows, or with soft shadows and ambient occlusion.
+    settings
+        Other fields of ``DisplayOptions``: ``shading="normals"``, ``wireframe=True``.
 
     Returns
     -------
@@ -96,7 +100,8 @@ def render(
     >>> viewer.render(viewer.load(), size=(64, 48)).shape
     (48, 64, 4)
     """
-    scene, shown = scene_of(scene, "render"), _display(options, background, quality, scalar)
+    settings |= {"background": background, "quality": quality, "scalar": scalar}
+    scene, shown = scene_of(scene, "render"), display_options("render", options, settings)
     _check_types(size, distance, azimuth, inclination, look_at)
     check_type("camera", camera, Camera, NoneType)
     if time is not None:
@@ -137,6 +142,7 @@ def video(
     scalar: str | None = None,
     background: str | None = None,
     quality: Quality | None = None,
+    **settings: object,
 ) -> None:
     """Record the motions of a scene or one actor; an existing file is replaced.
 
@@ -163,6 +169,8 @@ def video(
         Joint or actor at which the camera aims at the start, or that it follows.
     distance, azimuth, inclination, orthographic, scalar, background, quality
         As in ``viewer.render``.
+    settings
+        Other fields of ``DisplayOptions``: ``shading="normals"``, ``wireframe=True``.
 
     Raises
     ------
@@ -174,7 +182,8 @@ def video(
     # The command's other needs are not those of ``render``.
     from viewer.commands.render import Drawing, complete, draw_sequence
 
-    scene, shown = scene_of(scene, "video"), _display(options, background, quality, scalar)
+    settings |= {"background": background, "quality": quality, "scalar": scalar}
+    scene, shown = scene_of(scene, "video"), display_options("video", options, settings)
     _check_types(size, distance, azimuth, inclination, look_at)
     check_type("path", path, str, Path)
     check_type("frames", frames, range, NoneType)
@@ -243,24 +252,28 @@ def scene_at(scene: Scene, time: float) -> Scene:
     return scene
 
 
-def _display(
-    options: DisplayOptions | None,
-    background: str | None,
-    quality: Quality | None,
-    scalar: str | None,
+def display_options(
+    function: str, options: DisplayOptions | None, settings: Mapping[str, object]
 ) -> DisplayOptions:
-    """Return a copy of display options with the given values, all of which are checked."""
+    """Return a copy of display options with the settings that are not None, all checked.
+
+    ``function`` is named by the error for an unknown setting.
+    """
     check_type("options", options, DisplayOptions, NoneType)
-    for name, text in (("background", background), ("quality", quality), ("scalar", scalar)):
-        check_type(name, text, str, NoneType)
     shown = replace(DisplayOptions(quality="normal") if options is None else options)
-    if background is not None:
-        shown.background = background
-    if quality is not None:
-        shown.quality = quality
-    if scalar is not None:
-        shown.scalar, shown.shading = scalar, "scalar"
-    check_choices(shown)
+    known = [each.name for each in dataclasses.fields(DisplayOptions)]
+    for name, value in settings.items():
+        if name not in known:
+            near = did_you_mean(name, known)
+            raise ViewerError(
+                f"{function}: no option is called {printable(name, 60)}; "
+                f"{f'{near} ' if near else ''}allowed: {all_of(sorted(known))}"
+            )
+        if value is not None:
+            setattr(shown, name, value)
+    if settings.get("scalar") is not None and settings.get("shading") is None:
+        shown.shading = "scalar"
+    _check_display(shown)
     return shown
 
 
@@ -271,11 +284,28 @@ def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
         raise ViewerError(notes[0])
 
 
-def check_choices(options: DisplayOptions) -> None:
-    """Raise ViewerError if a display option has none of its possible values."""
+def _check_display(options: DisplayOptions) -> None:
+    """Raise ViewerError if a display option has another type than its default, or no such value."""
+    usual = DisplayOptions()
     for each in dataclasses.fields(options):
         choices = SHADING_CHOICES if each.name == "shading" else each.metadata.get("choices")
         value = getattr(options, each.name)
-        if choices and value not in choices:
+        if choices and value not in [*choices]:
             hint = name_hint(str(value), [*choices])
             raise ViewerError(f'{each.name}: no value "{printable(value, 60)}"; {hint}')
+        kinds = _OPTIONAL.get(each.name) or (type(getattr(usual, each.name)),)
+        check_type(each.name, value, *kinds)
+        low, high = each.metadata.get("limits", (-math.inf, math.inf))
+        if "limits" in each.metadata and not low <= value <= high:
+            raise ViewerError(f"{each.name}: expected {low:g} to {high:g}, found {value:g}")
+    ends = options.scalar_range
+    if ends is not None and (len(ends) != 2 or not all(isinstance(end, Real) for end in ends)):
+        raise ViewerError(f"scalar_range: expected two numbers, found {printable(ends, 60)}")
+
+
+_OPTIONAL: dict[str, tuple[type, ...]] = {
+    "scalar_range": (tuple, NoneType),
+    "isolines": (bool, NoneType),
+    "skeleton_opacity": (float, NoneType),
+}
+"""Types of the display options that are None by default; the others have that of their default."""
