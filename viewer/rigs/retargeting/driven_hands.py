@@ -2,9 +2,9 @@
 
 Retargeting preserves the directions of limbs, so hands that rest on a hip, touch the head or clap
 miss if proportions differ. Near a part of the body, a wrist gets the place relative to that part
-that it has in the source, scaled by the height; elbow and shoulder follow. Hands that are then
-inside the skin of the body, or of the other hand, are moved out. Hands of long arms stay above the
-ground if those of the source do.
+that it has in the source, scaled by the height; elbow and shoulder follow. Hands that are at the
+trunk, at the head or at each other in the source are then moved out of the skin. Hands of long arms
+stay above the ground if those of the source do.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.phrases import Remedy
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.cleanup.frames import in_frame_order
 from viewer.rigs.feet.body import (
     chain_worlds,
@@ -70,6 +70,13 @@ _SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _S
 # most files have the joint at the ears, some at the chin.
 _CROWN = 0.15
 
+_GIRTH = 75.0  # percentile of the distances of the skin from a thigh that is taken as its radius
+
+# Distances of a wrist of the motion from the axis of the trunk or the head: up to the first, the
+# hand is on it and may be moved out of the skin, beyond the second it may not. The wrist is up to
+# 0.17 away with the hand on a hip or on the belly, 0.19 to 0.23 where the arm swings beside the
+# body: there, a way out would only shake it.
+_ON, _OFF = 0.16, 0.19
 # Points of the skin, between which a person has about 3 cm, and those of a hand that are kept
 # outside the others.
 _POINTS, _HAND_POINTS = 2000, 24
@@ -77,6 +84,8 @@ _DEEP = 0.3  # depth up to which hands are moved out: more than half the width o
 # Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
 # edge of something thin, or of an open mesh, the nearest point is aside.
 _BEHIND = 0.5
+# Winding number between that of points of a closed skin, 1/2, and of an open sheet, 0.
+_SOLID = 0.25
 # Hands are moved out in rounds, each smoothed over that many seconds before and after a frame, so
 # that they begin to give way before they would enter the body: a tenth of a second is the time in
 # which a person's hand stops.
@@ -164,15 +173,12 @@ def keep_hands(
     )
     if not can_move:
         return given, None
-    shifts, nearness, together = _shifts(body, other, found.to_target)
+    radii = _radii(shape, mine, body.height)
+    shifts, nearness, together = _shifts(body, other, found.to_target, radii)
     before, least = (_error(each, nearness) for each in (shifts, _out_of_reach(body, shifts)))
     touches = any((np.linalg.norm(shift, axis=1) > _SLACK).any() for shift in shifts)
     # The proportions of the source are left alone: what its hands enter, it entered.
-    places = [each.at(arm[2]) - each.at("pelvis") for arm in _ARMS for each in (body, other)]
-    differs = any(
-        (np.linalg.norm(own - theirs @ found.to_target.T, axis=1) > _SHORT).any()
-        for own, theirs in zip(places[::2], places[1::2], strict=True)
-    )
+    differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
     shifts = [
@@ -182,7 +188,8 @@ def keep_hands(
     up = -axis_vector(figure.up) if hangs else axis_vector(figure.up)
     given_way = np.zeros((len(_ARMS), *shifts[0].shape))
     if points is not None and differs:
-        given_way = _ways_out(points, body, shifts, clip.timing)
+        rests_on = _rests_on(body, other, together)
+        given_way = _ways_out(points, body, shifts, rests_on, clip.timing)
         shifts = [shift + each for shift, each in zip(shifts, given_way, strict=True)]
     lifts = _lifts(body, other, found, skin, up, shifts)
     if not (any(shift.any() for shift in shifts) or lifts.any()):
@@ -201,7 +208,7 @@ def keep_hands(
     if not touches:
         return kept, KeptHands(0.0, 0.0, lifted=lifted, moved_out=moved_out)
     reached = _Body(skeleton, kept, mine, rests, crown=crown)
-    wished, _, _ = _shifts(reached, other, found.to_target)
+    wished, _, _ = _shifts(reached, other, found.to_target, radii)
     # Where a hand was moved out of the skin, it should be outside.
     missed = [shift + each for shift, each in zip(wished, given_way, strict=True)]
     return kept, KeptHands(before, _error(missed, nearness), least, lifted, moved_out)
@@ -269,7 +276,7 @@ def _driven_joints(found: Retargeted) -> dict[str, int]:
 
 
 def _shifts(
-    body: _Body, other: _Body, to_target: Floats
+    body: _Body, other: _Body, to_target: Floats, radii: dict[str, float]
 ) -> tuple[list[Floats], list[Floats], Floats]:
     """Return how far the wrists should move, (N, 3) each, and how near they are to the body, (N,).
 
@@ -277,20 +284,18 @@ def _shifts(
     """
     shifts, nearness = [], []
     for arm in _ARMS:
-        wrist, own = other.at(arm[2]) @ to_target.T, body.at(arm[2])
+        own = body.at(arm[2])
         total, weights = np.zeros_like(own), np.zeros(len(own))
         most = np.zeros(len(own))
         for start, end in _bones(body.place):
-            first, last = (other.at(name) @ to_target.T for name in (start, end))
-            # The nearest point a + t (b - a) of the bone.
-            bone = last - first
-            along = np.einsum("na,na->n", wrist - first, bone)
-            part = np.clip(along / np.maximum(np.einsum("na,na->n", bone, bone), 1e-30), 0, 1)
-            away = wrist - first - part[:, None] * bone
-            distance = np.linalg.norm(away, axis=1)
+            away, part = _from_bone(other, arm[2], start, end)
+            away, distance = away @ to_target.T, np.linalg.norm(away, axis=1)
             nearest = body.at(start) + part[:, None] * (body.at(end) - body.at(start))
+            # Stout thighs keep the hand outside: no nearer than their skin, unless it is already.
+            outside = np.minimum(radii.get(start, 0.0), np.linalg.norm(own - nearest, axis=1))
+            longer = np.maximum(outside / np.maximum(distance, 1e-30), 1.0)
             weight = falling((distance - _NEAR) / (_FAR - _NEAR))
-            total += weight[:, None] ** 2 * (nearest + away - own)
+            total += weight[:, None] ** 2 * (nearest + longer[:, None] * away - own)
             weights += weight**2
             most = np.maximum(most, weight)
         shifts.append((most / np.maximum(weights, 1e-30))[:, None] * total)
@@ -302,6 +307,26 @@ def _shifts(
     half = 0.5 * weight[:, None] * (between - (ends[1] - ends[0]))
     shifts = [shifts[0] - half, shifts[1] + half]
     return shifts, [np.maximum(near, weight) for near in nearness], weight
+
+
+def _from_bone(body: _Body, wrist: str, start: str, end: str) -> tuple[Floats, Floats]:
+    """Return a wrist relative to the nearest point a + t (b - a) of a bone, (N, 3), and t, (N,)."""
+    first, bone = body.at(start), body.at(end) - body.at(start)
+    away = body.at(wrist) - first
+    along = np.einsum("na,na->n", away, bone)
+    part = np.clip(along / np.maximum(np.einsum("na,na->n", bone, bone), 1e-30), 0, 1)
+    return away - part[:, None] * bone, part
+
+
+def _rests_on(body: _Body, other: _Body, together: Floats) -> Floats:
+    """Return how much hands of the source are on trunk, head or each other, 0 to 1: (2, N)."""
+    bones = [each for each in _bones(body.place) if each not in _PARTS[1:]]
+    result = []
+    for arm in _ARMS:
+        ways = [_from_bone(other, arm[2], *bone)[0] for bone in bones]
+        distance = np.linalg.norm(ways, axis=2).min(axis=0)
+        result.append(np.maximum(falling((distance - _ON) / (_OFF - _ON)), together))
+    return np.stack(result)
 
 
 def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
@@ -385,6 +410,25 @@ def _error(shifts: list[Floats], nearness: list[Floats]) -> float:
     return float(lengths.sum() / max(np.concatenate(nearness).sum(), 1e-30))
 
 
+def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, float]:
+    """Return the distance of the skin from each thigh's bone, by its first joint, if it has one."""
+    mesh, skin = figure.mesh, figure.skin
+    if mesh is None or skin is None or not figure.is_attached:
+        return {}
+    vertices, strongest = owners(skin), strongest_influences(skin)
+    points, result = rest_joints(figure), {}
+    for start, end in _PARTS[1:]:
+        own = vertices[strongest[skin.joints[strongest] == joints[start]]]
+        bone = points[joints[end]] - points[joints[start]]
+        length = float(np.linalg.norm(bone))
+        if not len(own) or length <= 0.0:
+            continue
+        away = mesh.positions[own] - points[joints[start]]
+        across = np.linalg.norm(np.cross(away, bone / length), axis=1)
+        result[start] = float(np.percentile(across, _GIRTH)) / height
+    return result
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _SkinPoints:
     """Points spread evenly over the skin of a body, each of which moves with one joint."""
@@ -443,6 +487,10 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
         hands[is_hand & (np.linalg.norm(points - rest[wrist], axis=1) < reach)] = number
     if not {0, 1} <= set(hands.tolist()):
         return None
+    kept = np.flatnonzero((hands >= 0) | _is_solid(points, normals, areas.sum() / _POINTS))
+    movers, points, normals, arms, hands = (
+        each[kept] for each in (movers, points, normals, arms, hands)
+    )
     crown = None
     if "head" in joints:
         own = descendants(parents, joints["head"])[movers]
@@ -456,10 +504,30 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
     return _SkinPoints(movers.astype(np.int32), places, normals, arms, hands, crown)
 
 
-def _ways_out(skin: _SkinPoints, body: _Body, shifts: list[Floats], timing: Timing) -> Floats:
+def _is_solid(points: Floats, normals: Floats, area: float) -> Bools:
+    """Return which points (P, 3) of a skin, each with an area, have an inside behind them: (P,).
+
+    The winding number (Barill et al. 2018) sums the solid angles of all pieces of the skin, as
+    fractions of the sphere: 1 inside, 0 outside. It is 1/2 at a point of a closed skin, or of one
+    with small openings, but 0 at one of an open sheet, such as a cape.
+    """
+    squares = (points**2).sum(axis=1)
+    distances = np.maximum(squares[:, None] + squares - 2.0 * points @ points.T, 0.0)
+    # Pieces have a width, so that those next to a point subtend less than a small one would.
+    distances += area
+    heights = (points * normals).sum(axis=1) - points @ normals.T
+    angles = (heights / (distances * np.sqrt(distances))).sum(axis=1)
+    is_solid: Bools = area / (4.0 * np.pi) * angles > _SOLID
+    return is_solid
+
+
+def _ways_out(
+    skin: _SkinPoints, body: _Body, shifts: list[Floats], rests_on: Floats, timing: Timing
+) -> Floats:
     """Return how far shifted wrists should move to keep hands outside the skin: (2, N, 3).
 
-    All lengths are relative to the height. Hands translate, as their world rotations stay.
+    ``rests_on``: (2, N), the part of the way that is gone. All lengths are relative to the height.
+    Hands translate, as their world rotations stay.
     """
     result = np.zeros((len(_ARMS), *shifts[0].shape))
     every = [np.flatnonzero(skin.hands == number).astype(np.int32) for number in range(len(_ARMS))]
@@ -487,9 +555,10 @@ def _ways_out(skin: _SkinPoints, body: _Body, shifts: list[Floats], timing: Timi
 
     everything = np.arange(len(place), dtype=np.int32)
     cases = []
-    for row in range(len(body.world)):
+    for row in np.flatnonzero(rests_on.any(axis=0)).tolist():
         points, _ = posed(row, everything)
-        for number, hand in enumerate(chosen):
+        for number in np.flatnonzero(rests_on[:, row]).tolist():
+            hand = chosen[number]
             others = points + with_other[number][:, None] * shifts[1 - number][row]
             own = points[hand] + shifts[number][row]
             centre = own.mean(axis=0)
@@ -511,7 +580,10 @@ def _ways_out(skin: _SkinPoints, body: _Body, shifts: list[Floats], timing: Timi
         for number, arm in enumerate(_ARMS):
             wanted = shifts[number] + result[number]
             result[number] = _within_reach(body, arm, wanted) - shifts[number]
-    return result
+    parts = rests_on[..., None].copy()
+    for start, stop in spans_of(timing):
+        parts[:, start:stop] = _smoothed(parts[:, start:stop], _WIDTH * timing.frame_rate)
+    return parts * result
 
 
 def _smoothed(curves: Floats, width: float) -> Floats:
