@@ -99,6 +99,7 @@ def clean(what: Scene | Actor, **options: object) -> Scene:
     """
     from viewer.loading.cleaning import clean_up
 
+    scene = scene_of(what, "clean")
     arguments = arguments_of("clean", _add_clean_arguments, options)
     with without_dashes():
         wanted = clean_up_of(arguments)
@@ -106,7 +107,6 @@ def clean(what: Scene | Actor, **options: object) -> Scene:
         wanted = replace(wanted, interpolates=True, longest_gap=sys.maxsize)
     if wanted.is_empty:
         raise ViewerError("clean: expected an option such as smooth or lock_feet, found none")
-    scene = scene_of(what, "clean")
     scene = replace(scene, actors=[actor.copy() for actor in scene.actors])
     notes = clean_up(scene, wanted)
     return replace(scene, diagnostics=(*scene.diagnostics, *notes))

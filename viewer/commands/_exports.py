@@ -77,12 +77,14 @@ def export(
     from viewer.commands._keywords import without_dashes
     from viewer.commands._pictures import scene_at
     from viewer.commands.convert import check_outputs, selected
-    from viewer.exporters import ExportOptions, export, output_files
+    from viewer.exporters import ExportOptions, VrmMeta, export, output_files
 
     check_type("path", path, str, Path)
     check_type("frames", frames, range, NoneType)
     check_type("fps", fps, float, NoneType)
     check_type("skinning", skinning, Skinning, NoneType)
+    check_type("meta", meta, VrmMeta, NoneType)
+    check_type("options", options, ExportOptions, NoneType)
     chosen = replace(options) if options is not None else ExportOptions()
     chosen.skinning = chosen.skinning if skinning is None else skinning
     chosen.meta, chosen.optimizes = meta or chosen.meta, optimizes or chosen.optimizes

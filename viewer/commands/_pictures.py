@@ -187,6 +187,9 @@ def video(
     _check_types(size, distance, azimuth, inclination, look_at)
     check_type("path", path, str, Path)
     check_type("frames", frames, range, NoneType)
+    check_type("fps", fps, float, NoneType)
+    check_type("speed", speed, float, NoneType)
+    check_type("follow", follow, str, NoneType)
     view = ViewOptions(
         look_at=look_at,
         follow=follow,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from types import NoneType
 from typing import TYPE_CHECKING, Literal, overload
 
+from viewer.arguments import check_type
+from viewer.rendering.camera import Camera
+from viewer.rendering.options import DisplayOptions
 from viewer.rigs.scene import Actor, Scene, scene_of
 
 if TYPE_CHECKING:
     from viewer.live.program import Window
-    from viewer.rendering.camera import Camera
-    from viewer.rendering.options import DisplayOptions
 
 
 @overload
@@ -64,6 +66,8 @@ def show(
         If there is no usable OpenGL.
     """
     found = scene_of(scene, "show")
+    check_type("camera", camera, Camera, NoneType)
+    check_type("options", options, DisplayOptions, NoneType)
     if not block:
         from viewer.live.program import Window
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from types import NoneType
 from typing import TYPE_CHECKING
 
+from viewer.arguments import check_type
 from viewer.errors import ViewerError
 from viewer.rigs.scene import Actor, Scene, scene_of
 from viewer.rigs.skinning import Skinning
@@ -44,4 +46,6 @@ def widget(
             f"viewer.widget: expected the package anywidget, found no {missing.name}: "
             "pip install 'skinning-viewer[notebook]'"
         ) from missing
+    check_type("skinning", skinning, Skinning, NoneType)
+    check_type("height", height, int)
     return SceneWidget(scene_of(scene, "widget"), skinning, height)

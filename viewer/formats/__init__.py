@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import FormatError, UnsupportedFormatError
@@ -425,6 +426,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     OutputError
         If the file cannot be written.
     """
+    check_type("path", path, str, Path)
     suffix = Path(path).suffix.lower()
     writers = {key: kind for key, kind in FORMATS.items() if kind.writes}
     for key, kind in writers.items():

@@ -17,6 +17,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -422,6 +423,7 @@ def connect(path: str | Path | None = None) -> Live:
     ViewerError
         If no window listens.
     """
+    check_type("path", path, str, Path, NoneType)
     return Live(path)
 
 

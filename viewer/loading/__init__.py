@@ -89,6 +89,8 @@ def load(
             )
     check_type("model", model, str, Path, NoneType)
     check_type("motion", motion, MotionSettings, NoneType)
+    check_type("gender", gender, str)
+    check_type("max_size", max_size, float)
     if gender and gender not in GENDERS:
         raise ViewerError(f'gender: expected {" or ".join(GENDERS)}, found "{printable(gender)}"')
     settings = motion or MotionSettings()

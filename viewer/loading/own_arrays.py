@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkable
+from pathlib import Path
+from types import NoneType
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,9 +29,6 @@ from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skin import Skin, skin_from_entries
 from viewer.rigs.units import METRES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Entries(Protocol):
@@ -118,9 +117,13 @@ def figure(
     'figure'
     """
     for what, given, known in (("up", up, ("y", "z")), ("unit", unit, ("", *METRES))):
+        check_type(what, given, str)
         if given not in known:
             allowed = ", ".join(f'"{each}"' for each in known)
             raise RigError(f"{what}: expected one of {allowed}, found {given!r}")
+    check_type("names", names, Sequence)
+    check_type("texture", texture, str, Path, np.ndarray, NoneType)
+    check_type("name", name, str)
     positions = _numbers("vertices", vertices, (None, 3))
     triangles = _triangles(faces, len(positions))
     coordinates = None if uvs is None else _numbers("uvs", uvs, (len(positions), 2))
@@ -195,6 +198,8 @@ def animate(
 
     check_type("figure", figure, Figure)
     check_type("fps", fps, float)
+    check_type("representation", representation, str, NoneType)
+    check_type("name", name, str)
     skeleton = figure.require_skeleton()
     quaternions = _quaternions(rotations, skeleton.n_joints, representation)
     count = len(quaternions)

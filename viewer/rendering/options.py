@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
 from viewer.rigs.skinning import Skinning
@@ -89,6 +91,11 @@ class Light:
     strength: float = setting(1.0, limits=(0.0, 4.0))
     """Multiplier of the colour."""
 
+    def __post_init__(self) -> None:
+        for name in ("azimuth", "inclination", "strength"):
+            check_type(name, getattr(self, name), float)
+        check_type("color", self.color, Sequence)
+
 
 @dataclass(slots=True)
 class Lights:
@@ -109,6 +116,14 @@ class Lights:
     """Strength of the studio that lights metallic-roughness surfaces."""
     follow_camera: bool = True
     """Whether the directions rotate with the camera."""
+
+    def __post_init__(self) -> None:
+        for name in ("key", "rim"):
+            check_type(name, getattr(self, name), Light)
+        for name in ("ambient", "specular", "shininess", "studio"):
+            check_type(name, getattr(self, name), float)
+        for name in ("sky", "ground"):
+            check_type(name, getattr(self, name), Sequence)
 
 
 @dataclass(slots=True)

@@ -5,10 +5,13 @@ In addition, there is toon shading with rim light and outline, as in ``VRMC_mate
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from types import NoneType
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bytes, Floats, freeze_fields
@@ -94,6 +97,13 @@ class Material:
     """Application data of a glTF file, as parsed from JSON; None if there is none."""
 
     def __post_init__(self) -> None:
+        check_type("name", self.name, str)
+        for name in TEXTURES:
+            check_type(name, getattr(self, name), Texture, NoneType)
+        check_type("rim", self.rim, Rim, NoneType)
+        check_type("outline", self.outline, Outline, NoneType)
+        check_type("normal_scale", self.normal_scale, float)
+        check_type("shade_range", self.shade_range, Sequence)
         _check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
         for name in ("metallic", "roughness", "occlusion_strength"):
             _check_numbers(name, (getattr(self, name),), 1.0)
@@ -163,6 +173,9 @@ class Texture:
     """The PNG or JPEG file that ``image`` was decoded from, if it was part of another file."""
 
     def __post_init__(self) -> None:
+        check_type("name", self.name, str)
+        check_type("uv_set", self.uv_set, int)
+        check_type("wrap", self.wrap, Sequence)
         if self.image is not None:
             freeze_fields(self, np.uint8, image=(None, None, 4))
         if self.transform is None:
@@ -246,9 +259,11 @@ def _check_numbers(
     name: str, values: tuple[float, ...], most: float = float("inf"), count: int = 1
 ) -> None:
     """Raise RigError unless ``count`` numbers are finite, at least 0, and at most ``most``."""
+    check_type(name, values, Sequence)
     if len(values) != count:
         raise RigError(f"{name}: expected {count} numbers, found {len(values)}")
     for value in values:
+        check_type(name, value, float)
         if not (0.0 <= value <= most and np.isfinite(value)):
             limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
             raise RigError(f"{name}: expected {limits}, found {value}")

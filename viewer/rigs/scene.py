@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
+from types import NoneType
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -161,6 +162,7 @@ class Actor:
 
     def __post_init__(self) -> None:
         check_type("figure", self.figure, Figure)
+        check_type("own_pose", self.own_pose, Pose, NoneType)
         if self.own_pose is None and self.figure.skeleton is not None:
             self.own_pose = figure_pose(self.figure)
 
@@ -242,10 +244,13 @@ class Actor:
         (1, 7561, 3)
         """
         from viewer.rigs.motion.evaluation import pose_of
-        from viewer.rigs.skinning import deform
+        from viewer.rigs.skinning import Skinning, deform
 
+        check_type("skinning", skinning, Skinning, NoneType)
         figure, mesh = self.figure, self.figure.require_mesh()
         if figure.skeleton is None:
+            if time is not None:
+                self._reached(time)
             placed = apply_transform(self.placement, mesh.positions)
             return placed[None] if time is None else placed
         frames = self._frames(time)
@@ -311,12 +316,14 @@ class Actor:
 
         motion, figure = self.joint_motion, self.figure
         figure.require_skeleton()
+        if time is not None:
+            time = self._reached(time)
         if motion is None:
             return still_frames(figure, self.pose)
         if time is None:
             times = frame_times(motion.start, motion.end, motion.frame_rate)
         else:
-            times = np.array([self._reached(time) - self.offset])
+            times = np.array([time - self.offset])
         return frames_of(figure, motion, times, self.own_pose)
 
     def _reached(self, time: float) -> float:
@@ -382,6 +389,7 @@ class Scene:
     None if there is only one space."""
 
     def __post_init__(self) -> None:
+        check_type("actors", self.actors, Iterable)
         for actor in self.actors:
             check_type("actors", actor, Actor)
 

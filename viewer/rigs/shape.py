@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.arguments import check_type
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints, frozen
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.kinematics import world_matrices
@@ -49,7 +49,7 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
         If the offsets are read by this call and the file is invalid.
     """
     check_type("figure", figure, Figure)
-    weights = np.asarray(weights)
+    weights = frozen("weights", weights, (None,))
     mesh, shapes = figure.mesh, figure.blend_shapes
     if shapes is None or mesh is None or not weights.any():
         return figure
@@ -117,6 +117,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
 
     check_type("figure", figure, Figure)
     mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
+    positions = frozen("positions", positions, (mesh.n_vertices, 3))
     normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
     new_mesh = replace(mesh, positions=positions, normals=normals)
     if figure.joint_regressor is None or skeleton is None:

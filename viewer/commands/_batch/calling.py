@@ -12,6 +12,7 @@ from hashlib import blake2b
 from types import CellType, CodeType
 from typing import TYPE_CHECKING, Any
 
+from viewer.arguments import check_type
 from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
@@ -121,7 +122,14 @@ def batch(
     KeyboardInterrupt
         After Ctrl-C, once the running items are finished; a second Ctrl-C cancels them.
     """
-    names = [paths] if isinstance(paths, str | os.PathLike) else paths
+    check_type("paths", paths, str, os.PathLike, Iterable)
+    check_type("job", job, str, Callable)  # type: ignore[arg-type]
+    check_type("shared", shared, Sequence)
+    names = [paths] if isinstance(paths, str | os.PathLike) else [*paths]
+    files = {"out": [out], "report": [report], "table": [table], "overview": [overview]}
+    for argument, given in ({"paths": names, "shared": shared} | files).items():
+        for each in given:
+            check_type(argument, each, str, os.PathLike)
     request = Request(
         paths=[os.fspath(name) for name in names],
         output=os.fspath(out),

@@ -16,11 +16,12 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.phrases import all_of
-from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields
+from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields, frozen
 from viewer.rigs.memo import Memo
 from viewer.rigs.motion.samples import Samples
 from viewer.rigs.motion.timing import DEFAULT_RATE
@@ -134,8 +135,9 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
     (...)
         Lengths or radians.
     """
-    times = np.asarray(times, dtype=np.float64)
-    return _values(_table((channel,)), times.ravel())[:, 0].reshape(times.shape)
+    check_type("channel", channel, Channel)
+    flat = frozen("times", np.ravel(times), (None,))
+    return _values(_table((channel,)), flat)[:, 0].reshape(np.shape(times))
 
 
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
@@ -158,6 +160,10 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     out
         Modified in place.
     """
+    check_type("clip", clip, Clip)
+    check_type("skeleton", skeleton, Skeleton)
+    check_type("time", time, float)
+    check_type("out", out, Pose)
     targets, values = evaluate_all(clip, np.array([time]))
     out.dofs[targets] = values[0]
     out.dofs[:] = clamp_dofs(skeleton, out.dofs)

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.errors import RigError
+from viewer.rigs.arrays import frozen
 from viewer.rigs.scene import Actor, Scene, pose_actors, scene_of
 
 FAINTEST = 0.22
@@ -54,14 +56,18 @@ def onion(
     viewer.errors.RigError: nothing moves: no actor has a motion
     """
     scene = scene_of(scene, "onion")
+    check_type("times", times, int, Iterable)
+    check_type("faintest", faintest, float)
     moving = [actor for actor in scene.actors if actor.clip is not None]
     if not moving:
         raise RigError("nothing moves: no actor has a motion")
     if isinstance(times, int):
+        if times < 1:
+            raise RigError(f"times: expected at least one, found {times}")
         clips = [(actor.require_clip(), actor.offset) for actor in moving]
         first = min(clip.start + offset for clip, offset in clips)
         times = np.linspace(first, max(clip.end + offset for clip, offset in clips), times)
-    ordered = sorted(map(float, times), reverse=True)
+    ordered = sorted(frozen("times", [*times], (None,)).tolist(), reverse=True)
     if not ordered:
         raise RigError("expected at least one time, found none")
     actors = [actor.copy() for actor in scene.actors if actor.clip is None]

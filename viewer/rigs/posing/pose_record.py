@@ -8,6 +8,7 @@ from dataclasses import field
 
 import numpy as np
 
+from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
@@ -107,6 +108,9 @@ def record_of(figure: Figure, pose: Pose, gender: str = "") -> PoseRecord:
     gender
         Gender of the body, as stated by its file; that of the figure if empty.
     """
+    check_type("figure", figure, Figure)
+    check_type("pose", pose, Pose)
+    check_type("gender", gender, str)
     skeleton = figure.require_skeleton()
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     weights = np.zeros(len(groups))
@@ -162,6 +166,9 @@ def apply_record(
     RigError
         If the figures have no joint name in common.
     """
+    check_type("record", record, PoseRecord)
+    check_type("figure", figure, Figure)
+    check_type("pose", pose, Pose)
     skeleton = figure.skeleton
     if skeleton is None:
         raise RigError(note(wording.POSE, figure=figure.name))

@@ -144,6 +144,7 @@ def deform(
     """
     check_type("figure", figure, Figure)
     check_type("pose", pose, Pose, NoneType)
+    check_type("method", method, str, Skinning)
     how = Skinning(method) if isinstance(method, str) else method
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
@@ -218,6 +219,9 @@ def deform_frames(
     """
     check_type("figure", figure, Figure)
     check_type("poses", poses, Sequence)
+    for pose in poses:
+        check_type("poses", pose, Pose)
+    check_type("skinning", skinning, Skinning, NoneType)
     how = skinning or Skinning()
     if not poses or not figure.is_attached or how.method != "lbs":
         raise RigError("expected poses, a figure with mesh, skeleton and skin, and method lbs")
