@@ -278,7 +278,7 @@ TINY = (32, 24)
         (lambda: viewer.render(ACT, TINY, distance="3"), "^distance: expected a number or None"),
         (lambda: viewer.render(ACT, TINY, camera="front"), "^camera: expected Camera or None"),
         (lambda: viewer.render(ACT, TINY, options={}), "^options: expected DisplayOptions or None"),
-        (lambda: viewer.render(ACT, TINY, background=3), "^background: expected a text or None"),
+        (lambda: viewer.render(ACT, TINY, background=3), "^background: expected a text, found int"),
         (lambda: viewer.animate(ACT, np.zeros((1, 2, 3))), "^figure: expected Figure, found Actor"),
         (lambda: viewer.animate(leg(), np.zeros((1, 2, 3)), fps="x"), "^fps: expected a number"),
         (lambda: viewer.figure(SQUARE, [[0, 1, 2]], up="x"), "^up: expected one of .*, found 'x'"),
