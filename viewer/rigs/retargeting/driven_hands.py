@@ -453,7 +453,7 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
         return None
     corners = mesh.positions[mesh.triangles]
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(crosses, axis=1)
+    areas = 0.5 * np.linalg.norm(crosses, axis=1)
     if not areas.sum() > 0.0:
         return None
     # Equal areas lie between the points in the order of the triangles; within these, two powers of
@@ -511,6 +511,9 @@ def _is_solid(points: Floats, normals: Floats, area: float) -> Bools:
     fractions of the sphere: 1 inside, 0 outside. It is 1/2 at a point of a closed skin, or of one
     with small openings, but 0 at one of an open sheet, such as a cape.
     """
+    # Single precision, around the middle, takes half the time.
+    points = (points - points.mean(axis=0)).astype(np.float32)
+    normals = normals.astype(np.float32)
     squares = (points**2).sum(axis=1)
     distances = np.maximum(squares[:, None] + squares - 2.0 * points @ points.T, 0.0)
     # Pieces have a width, so that those next to a point subtend less than a small one would.
