@@ -1,5 +1,7 @@
 """Programs that move a window over real loopback connections; expected numbers are by hand."""
 
+import hmac
+import io
 import json
 import math
 import os
@@ -7,8 +9,11 @@ import random
 import re
 import socket
 import stat
+import threading
 import time
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +25,7 @@ from viewer.app.closing import Closing
 from viewer.app.live import _ACTIONS
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path
+from viewer.live.handshake import join
 from viewer.live.messages import Message, packed, read, receiver
 from viewer.live.objects import pack
 from viewer.live.server import Server
@@ -65,17 +71,31 @@ def raw(screen, *messages):
     with socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream:
         receive = receiver(stream)
         for data in messages:
-            stream.sendall(data)
             try:
+                stream.sendall(data(found[-1]) if callable(data) else data)
                 found.append(read(receive))
             except (EOFError, OSError):
                 break
     return found
 
 
-def hello(screen, **changes):
-    token = json.loads(screen.path.read_text())["token"]
-    return packed(Message("hello", {"version": 1, "token": token, **changes}))
+NONCE = bytes(range(32))
+
+
+def hello(**changes):
+    return packed(Message("hello", {"version": 2, "nonce": NONCE.hex(), **changes}))
+
+
+def prove(path, side="program", **facts):
+    """Return a function that answers the window's nonce, written without code of the viewer."""
+    token = json.loads(path.read_text())["token"].encode()
+
+    def answer(found):
+        text = side.encode() + NONCE + bytes.fromhex(found.facts["nonce"])
+        proof = hmac.new(token, text, "sha256").hexdigest()
+        return packed(Message("prove", {"proof": proof, **facts}))
+
+    return answer
 
 
 def test_added_figure_is_bent_about_its_joint(screen, live):
@@ -206,10 +226,10 @@ def test_programs_share_a_window_and_leave_what_they_sent(screen):
 
 
 def test_window_closes_when_the_program_that_owns_it_is_killed(screen):
-    raw(screen, hello(screen))
+    raw(screen, hello(), prove(screen.path))
     screen.wait(lambda: screen.server.counts.clients == 0)
     assert not screen.state.of(Closing).is_over
-    raw(screen, hello(screen, owns=True))
+    raw(screen, hello(), prove(screen.path, owns=True))
     screen.wait(lambda: screen.state.of(Closing).is_over)
 
 
@@ -245,14 +265,127 @@ def test_closed_window_is_an_error_of_one_line(tmp_path):
 def test_only_the_user_on_this_machine_gets_in(screen):
     assert screen.server._socket.getsockname()[0] == "127.0.0.1"
     assert stat.S_IMODE(screen.path.stat().st_mode) == 0o600
-    answers = [
-        raw(screen, hello(screen, token="guess"), packed(Message("get", {}))),
-        raw(screen, hello(screen, version=2)),
-        raw(screen, packed(Message("get", {}))),
-        raw(screen, framed({"do": "hello", "token": "x" * 5000})),
+    refused = [
+        [hello(), packed(Message("prove", {"proof": "guess"})), packed(Message("get", {}))],
+        [hello(), packed(Message("prove", {"proof": "\ud800"}))],
+        [hello(), prove(screen.path, side="window")],  # as the window itself answers
+        [hello(), packed(Message("get", {}))],
+        [hello(version=1)],
+        [hello(nonce="00")],
+        [packed(Message("get", {}))],
+        [packed(Message("prove", {"proof": "guess"}))],
+        [framed({"do": "hello", "nonce": "x" * 5000})],
     ]
-    assert [[each.do for each in found] for found in answers] == [["error"]] * 4
-    assert screen.server.counts.refused == 4
+    answers = [raw(screen, *messages) for messages in refused]
+    dos = [[each.do for each in found] for found in answers]
+    assert dos == [["ok", "error"]] * 4 + [["error"]] * 5
+    assert screen.server.counts.refused == 9
+    assert "same version of viewer" in answers[4][0].facts["text"]
+
+
+def test_token_is_never_sent(screen):
+    token = json.loads(screen.path.read_text())["token"]
+    greeted, let_in = raw(screen, hello(), prove(screen.path))
+    assert let_in.do == "ok"
+    text = b"window" + NONCE + bytes.fromhex(greeted.facts["nonce"])
+    assert greeted.facts["proof"] == hmac.new(token.encode(), text, "sha256").hexdigest()
+    assert token not in str([greeted.facts, let_in.facts])
+    again, _ = raw(screen, hello(), prove(screen.path))
+    assert again.facts["nonce"] != greeted.facts["nonce"]
+
+
+@contextmanager
+def other_program(path, *answers):
+    """Listen on the port of a crashed window, and answer with bytes; yields what is received."""
+    received = bytearray()
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = listening.getsockname()[1]
+        path.write_text(json.dumps({"port": port, "token": "secret", "pid": 1}))
+        path.chmod(0o600)
+
+        def run():
+            with suppress(OSError), listening.accept()[0] as stream:
+                for answer in answers:
+                    received.extend(stream.recv(10_000))
+                    stream.sendall(answer)
+                while data := stream.recv(10_000):
+                    received.extend(data)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        yield received
+        with suppress(OSError):
+            listening.shutdown(socket.SHUT_RDWR)
+        thread.join()
+
+
+def ok(**facts):
+    return packed(Message("ok", facts))
+
+
+NO_WINDOWS = [
+    b"HTTP/1.1 400 Bad Request\r\n\r\n",
+    ok(),
+    ok(nonce="00", proof="00"),
+    ok(nonce=NONCE.hex(), proof=64 * "0"),
+    ok(nonce=NONCE.hex(), proof="\ud800"),
+    ok(nonce=[], proof=3),
+    packed(Message("error", {})),
+]
+
+
+@pytest.mark.parametrize("answer", NO_WINDOWS)
+def test_program_on_the_port_of_a_crashed_window_learns_nothing(tmp_path, answer):
+    path = tmp_path / "window.json"
+    with (
+        other_program(path, answer) as received,
+        pytest.raises(ViewerError, match="found another program: the window has crashed"),
+    ):
+        viewer.connect(path)
+    told = read(io.BytesIO(received).read)
+    assert (told.do, told.facts.keys()) == ("hello", {"version", "nonce"})
+    assert received == packed(told)  # nothing follows
+
+
+def test_proof_of_the_program_is_not_one_of_the_window(tmp_path, monkeypatch):
+    monkeypatch.setattr("secrets.token_bytes", lambda size: NONCE)
+    path = tmp_path / "window.json"
+    proof = hmac.new(b"secret", b"program" + 2 * NONCE, "sha256").hexdigest()
+    with (
+        other_program(path, ok(nonce=NONCE.hex(), proof=proof)),
+        pytest.raises(ViewerError, match="found another program"),
+    ):
+        viewer.connect(path)
+
+
+@pytest.mark.parametrize("answer", NO_WINDOWS)
+def test_window_opens_where_another_program_has_the_old_port(tmp_path, answer):
+    path = tmp_path / "window.json"
+    with other_program(path, answer):
+        Server(path).close()
+
+
+def test_window_of_an_older_version_says_so_and_keeps_its_file(tmp_path):
+    text = "expected version 1 of the protocol, found 2"  # as version 0.6.0 answers
+    path = tmp_path / "window.json"
+    with (
+        other_program(path, packed(Message("error", {"text": text + "\x1b[2J"}))),
+        pytest.raises(ViewerError, match=text) as problem,
+    ):
+        viewer.connect(path)
+    assert "\x1b" not in str(problem.value)
+    with (
+        other_program(path, packed(Message("error", {"text": text}))),
+        pytest.raises(ViewerError, match="expected no other window"),
+    ):
+        Server(path)
+
+
+def test_window_that_does_not_answer_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(join, "__defaults__", (False, 0.05))
+    path = tmp_path / "window.json"
+    with other_program(path), pytest.raises(ViewerError, match="did not answer"):
+        viewer.connect(path)
 
 
 def test_client_without_the_token_may_not_stay_however_slowly_it_sends(screen, monkeypatch):
@@ -262,7 +395,7 @@ def test_client_without_the_token_may_not_stay_however_slowly_it_sends(screen, m
         socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream,
         pytest.raises(OSError),
     ):
-        for each in hello(screen):
+        for each in hello():
             stream.sendall(bytes([each]))
             time.sleep(0.05)
     assert time.monotonic() - began < 5.0
@@ -326,7 +459,9 @@ def pose_of(**changes):
 )
 def test_bad_message_is_answered_counted_and_survived(screen, message, why):
     screen.wait(lambda: screen.server.actors)
-    ok, bad, after = raw(screen, hello(screen), packed(message), packed(Message("get", {})))
+    _, ok, bad, after = raw(
+        screen, hello(), prove(screen.path), packed(message), packed(Message("get", {}))
+    )
     assert (ok.do, bad.do, after.do) == ("ok", "error", "ok")
     assert re.search(why, bad.facts["text"]), bad.facts["text"]
     assert after.facts["counts"]["refused"] == 1
@@ -385,13 +520,18 @@ def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, m
 
 
 def test_random_bytes_leave_the_server_at_work(screen):
-    rng = random.Random(11)
-    for _ in range(30):
-        data = bytearray(hello(screen) + packed(pose_of()))
+    rng, known = random.Random(11), prove(screen.path)
+    for number in range(30):
+        data = bytearray(hello() if number % 2 else packed(pose_of()))
         for _ in range(rng.randrange(6)):
             data[rng.randrange(len(data))] = rng.randrange(256)
+        data = bytes(data[: rng.randrange(len(data))])
         with socket.create_connection(("127.0.0.1", screen.server.port), 10) as stream:
-            stream.sendall(data[: rng.randrange(len(data))])
+            if number % 2 == 0:
+                stream.sendall(hello())
+                stream.sendall(known(read(receiver(stream))))
+                read(receiver(stream))
+            stream.sendall(data)
     with viewer.connect(screen.path) as live:
         assert live.selection == ("first",)
     screen.wait(lambda: screen.server.counts.clients == 0)
@@ -404,19 +544,11 @@ def test_of_many_poses_the_latest_is_shown(tmp_path):
     server.follow([first])
     server.start()
     try:
-        with socket.create_connection(("127.0.0.1", server.port), 10) as stream:
-            receive = receiver(stream)
-            for data in (hello_of(path), *(packed(pose_of()) for _ in range(50))):
-                stream.sendall(data)
-                assert read(receive).do == "ok"
+        found = raw(SimpleNamespace(server=server), hello(), prove(path), *[packed(pose_of())] * 50)
+        assert [each.do for each in found] == ["ok"] * 52
         assert list(server.take_poses()) == [1]
     finally:
         server.close()
-
-
-def hello_of(path):
-    token = json.loads(path.read_text())["token"]
-    return packed(Message("hello", {"version": 1, "token": token}))
 
 
 @pytest.mark.parametrize("name", ["pose", "placement"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 import stat
 from pathlib import Path
 
@@ -27,14 +26,6 @@ class Connection:
     token: str
     pid: int
     """Process of the window."""
-
-    def is_alive(self) -> bool:
-        """Return whether something listens there; a window that crashed leaves its file behind."""
-        try:
-            socket.create_connection(("127.0.0.1", self.port), 1.0).close()
-        except OSError:
-            return False
-        return True
 
 
 def file_path(path: str | Path | None = None) -> Path:

@@ -28,7 +28,7 @@ from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rigs.file_record import Json
 
-VERSION = 1
+VERSION = 2
 """Version of the protocol; programs and windows of different versions refuse each other."""
 
 _MARK = b"SKL1"
@@ -57,7 +57,7 @@ class Limits:
 
 
 FIRST = Limits(4096, 0)
-"""Of the first message, whose token is not yet known."""
+"""Of the handshake, before the token is known."""
 USUAL = Limits(16 << 20, 1 << 30)
 """Of all others: names and settings, and the vertices of a scene."""
 

@@ -26,8 +26,8 @@ from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RenderError, ViewerError
 from viewer.live.connection_file import file_path, read_file
+from viewer.live.handshake import NotTheWindowError, join
 from viewer.live.messages import (
-    VERSION,
     Message,
     MessageError,
     Values,
@@ -97,19 +97,12 @@ class Live:
         self._loss: ViewerError = _ClosedError("the window was closed")
         self._problem = ""
         """Error with which the thread's last look ended."""
-        self._socket = _connected(file_path(path))
+        self._socket = _connected(file_path(path), self._owns)
         self._receive = receiver(self._socket)
         self._arrivals = selectors.DefaultSelector()
         self._arrivals.register(self._socket, selectors.EVENT_READ)
-        self._hello(path)
         _CONNECTIONS.add(self)
         threading.Thread(target=self._follow, name="live", daemon=True).start()
-
-    def _hello(self, path: str | Path | None) -> None:
-        known = read_file(file_path(path))
-        assert known is not None  # as it has been connected
-        facts = {"version": VERSION, "token": known.token, "owns": self._owns}
-        self._ask("hello", facts)
 
     @property
     def is_open(self) -> bool:
@@ -427,21 +420,29 @@ def connect(path: str | Path | None = None) -> Live:
     return Live(path)
 
 
-def _connected(path: Path) -> socket.socket:
+def _connected(path: Path, owns: bool) -> socket.socket:
     """Return a connection to the window of a connection file."""
-    known = read_file(path)
+    known, name = read_file(path), printable(path, 300)
     if known is None:
         raise ViewerError(
-            f"{printable(path, 300)}: expected the connection file of a window, found none: "
-            "start viewer serve"
+            f"{name}: expected the connection file of a window, found none: start viewer serve"
         )
     try:
-        stream = socket.create_connection(("127.0.0.1", known.port), _ANSWER_SECONDS)
-    except OSError:
+        stream = join(known, owns)
+    except ConnectionRefusedError:
         raise ViewerError(
-            f"{printable(path, 300)}: expected a window on port {known.port}, found none: "
-            "start viewer serve"
+            f"{name}: expected a window on port {known.port}, found none: start viewer serve"
         ) from None
+    except OSError:
+        raise ViewerError(f"{name}: the window on port {known.port} did not answer") from None
+    except NotTheWindowError:
+        raise ViewerError(
+            f"{name}: expected a window on port {known.port}, found another program: the window "
+            "has crashed; start viewer serve"
+        ) from None
+    except ViewerError as problem:
+        raise ViewerError(f"{name}: {problem}") from None
+    stream.settimeout(_ANSWER_SECONDS)
     # Poses are small and must not wait to be sent together.
     stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return stream

@@ -1,15 +1,14 @@
 """Server of a window: programs of the same user and machine send it figures, poses and settings.
 
 It listens on the loopback address only. A file that only the user can read has the port and a
-random token, which the first message of a connection must state. A thread per client reads and
-checks messages; those that touch the scene wait in a queue for the frame loop. Poses do not wait:
-the latest one of each actor is shown in the next frame.
+random token, which a client must prove to know. A thread per client reads and checks messages;
+those that touch the scene wait in a queue for the frame loop. Poses do not wait: the latest one of
+each actor is shown in the next frame.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hmac
 import queue
 import secrets
 import socket
@@ -26,9 +25,9 @@ from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path, read_file, write_file
+from viewer.live.handshake import Greeting, is_alive
 from viewer.live.messages import (
     FIRST,
-    VERSION,
     BrokenStreamError,
     Message,
     MessageError,
@@ -49,7 +48,7 @@ from viewer.rigs.skinning import deform
 
 _MOST_CLIENTS = 16
 _MOST_WAITING = 64  # requests in the queue; further clients wait
-_FIRST_SECONDS = 5.0  # in which a client must state the token
+_FIRST_SECONDS = 5.0  # in which a client must prove to know the token
 _ANSWER_SECONDS = 60.0  # in which the frame loop must answer
 
 POSE = ("dofs", "translations", "rotations", "scales", "shape_weights", "figure_translation")
@@ -116,7 +115,7 @@ class Server:
     def __init__(self, path: str | Path | None = None) -> None:
         self.path = file_path(path)
         existing = read_file(self.path)
-        if existing is not None and existing.is_alive():
+        if existing is not None and is_alive(existing):
             raise ViewerError(
                 f"{printable(self.path, 300)}: expected no other window, found that of process "
                 f"{existing.pid}: close it, or name another file with --connection-file"
@@ -211,18 +210,19 @@ class Server:
     def _serve(self, client: socket.socket) -> None:
         """Answer one client until it leaves; what it has sent stays, unless it owns the window."""
         self.counts.clients += 1
+        greeting = Greeting(self._token)
         try:
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             # However slowly a client sends, it does not occupy a place for long without the token.
-            receive, is_known, owns = receiver(client, _FIRST_SECONDS), False, False
+            receive = receiver(client, _FIRST_SECONDS)
             while not self._is_over:
+                is_known = greeting.is_over
                 try:
                     message = read(receive) if is_known else read(receive, FIRST)
                     self.counts.messages += 1
-                    answer = self._answer(message) if is_known else self._greet(message)
-                    owns |= message.do == "hello" and message.facts.get("owns") is True
-                    if not is_known:
-                        is_known, receive = True, receiver(client)
+                    answer = self._answer(message) if is_known else greeting.answer(message)
+                    if greeting.is_over and not is_known:
+                        receive = receiver(client)
                         client.settimeout(None)
                 except (EOFError, OSError):
                     return
@@ -240,20 +240,9 @@ class Server:
             self.counts.clients -= 1
             self._clients.discard(client)
             client.close()
-            if owns:
+            if greeting.owns:
                 self._requests.put(Request(Message("close", {}), None))
             self.wake()
-
-    def _greet(self, message: Message) -> Message:
-        """Check the first message."""
-        if message.do != "hello":
-            raise MessageError(f"expected hello, found {printable(message.do, 60)}")
-        if message.index("version") != VERSION:
-            found = message.index("version")
-            raise MessageError(f"expected version {VERSION} of the protocol, found {found}")
-        if not hmac.compare_digest(message.text("token").encode(), self._token.encode()):
-            raise MessageError("wrong token")
-        return Message("ok", {"version": VERSION})
 
     def _answer(self, message: Message) -> Message:
         if message.do == "pose":
