@@ -63,6 +63,8 @@ class Crowd:
         self.models: Floats = np.zeros((0, 4, 4))
         self.colors: list[Color | None] = []
         self._table, self._places = ArrayTable(), ArrayTable()
+        # Since the models were computed; an error may have been raised in between.
+        self._is_moved = self._is_shifted = False
         self._scales: list[float] = []
         self._placed_opacities: Floats = np.zeros(0)
         self._reflected: Bools = np.zeros(0, dtype=np.bool_)
@@ -87,16 +89,18 @@ class Crowd:
             if changed.any():
                 self.version += 1
                 self.versions[changed] = self.version
-        # The last three numbers translate the whole figure.
-        self._place(differ is not None and bool(differ[:, -3:].any()))
+            # The last three numbers translate the whole figure.
+            self._is_shifted |= bool(differ[:, -3:].any())
+        self._place()
 
-    def _place(self, is_shifted: bool) -> None:
+    def _place(self) -> None:
         moved = self._places.update(list(map(unwatched("placement"), self.actors)))
+        self._is_moved |= moved is not None
         scales = [pose.figure_scale for pose in self.poses]
         colors = [actor.color for actor in self.actors]
-        is_turned = moved is not None or scales != self._scales
+        is_turned = self._is_moved or scales != self._scales
         is_faded = not np.array_equal(self.opacities, self._placed_opacities)
-        if not (is_turned or is_shifted or is_faded or colors != self.colors):
+        if not (is_turned or self._is_shifted or is_faded or colors != self.colors):
             return
         placed = self._places.values.reshape(-1, 4, 4)
         self.models, self.colors = placed @ placements(self.poses), colors
@@ -106,6 +110,7 @@ class Crowd:
             self._reflected = reflected
         self._order_version += is_faded
         self._scales, self._placed_opacities = scales, self.opacities
+        self._is_moved = self._is_shifted = False
         self.placement_version += 1
 
     def joint_groups(self) -> list[Group]:
