@@ -1,12 +1,16 @@
 """Whether anyone can have written the arrays of a pose or an actor since the last look."""
 
 import copy
+import weakref
 
 import numpy as np
 import pytest
 from rigs.hand_made import skeleton
 
+import viewer
+from viewer.rigs import watched_arrays
 from viewer.rigs.pose import Pose, pose_key, rest_pose
+from viewer.rigs.scene import Actor
 from viewer.rigs.watched_arrays import Watch
 
 
@@ -73,6 +77,38 @@ def test_memory_of_another_array_may_change_at_any_time():
     for _ in range(3):
         assert not watch.look(owners)
         watch.keep()
+
+
+def test_array_behind_a_weak_reference_may_change_at_any_time():
+    owners = poses()
+    weak = weakref.ref(owners[1].values)
+    watch = Watch("values", "shape_weights")
+    for _ in range(3):
+        assert not watch.look(owners)
+        watch.keep()
+        weak()[0] += 1.0
+    del weak
+    assert not watch.look(owners)
+    watch.keep()
+    assert watch.look(owners)
+
+
+def test_everything_may_have_changed_where_references_are_not_counted(monkeypatch):
+    owners = poses()
+    watch = watching(owners)
+    monkeypatch.setattr(watched_arrays, "_COUNTS_REFERENCES", False)
+    for _ in range(2):
+        assert not watch.look(owners)
+        watch.keep()
+
+
+def test_another_actor_in_the_place_of_one_is_a_change():
+    figure = viewer.load("fox").actors[0].figure
+    watch, actors = Watch("placement"), [Actor(figure), Actor(figure)]
+    watch.look(actors[:1])
+    watch.keep()
+    assert watch.look(actors[:1])
+    assert not watch.look(actors[1:])
 
 
 def test_another_pose_in_the_place_of_one_is_a_change():

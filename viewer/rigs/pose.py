@@ -66,7 +66,7 @@ class Pose:
     """The joints that ``pose["left_knee"]`` names."""
     posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
     """Cached matrices; up to date if they have the key of the current values."""
-    handed: object = field(default=None, init=False, repr=False)
+    handed: object = field(default_factory=object, init=False, repr=False)
     """Another object whenever the values or the shape weights were asked for or set."""
     _key: NumberKey | None = field(default=None, init=False, repr=False)
 

@@ -106,7 +106,7 @@ class Actor:
     clip_origin: tuple[Path, Motion] | None = None
     """File of its motion, and the clip as it was opened: an edited one is another object. Clips
     that are animations of the figure come from the file of the figure."""
-    handed: object = field(default=None, init=False, repr=False)
+    handed: object = field(default_factory=object, init=False, repr=False)
     """Another object whenever the placement was asked for or set."""
 
     @property

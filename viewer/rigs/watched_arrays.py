@@ -2,7 +2,8 @@
 
 Nobody is told when an array is written. But a write needs a reference to the array, so an array of
 which its owner holds the only reference, and which nobody has asked the owner for since the last
-look, has its old values. A thousand such arrays need no comparison.
+look, has its old values. A thousand such arrays need no comparison. Only a bare address is no
+reference: C code that keeps one must keep the array too.
 """
 
 from __future__ import annotations
@@ -10,13 +11,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from itertools import repeat
-from operator import attrgetter, is_not
+from operator import attrgetter
 from typing import Any, TypeVar
+from weakref import getweakrefcount
 
 import numpy as np
 
 _Class = TypeVar("_Class", bound=type)
+
+# Other interpreters do not count references, and threads without a lock count them apart.
+_COUNTS_REFERENCES = sys.implementation.name == "cpython" and "free-threading" not in sys.version
 
 
 def watched(*names: str) -> Callable[[_Class], _Class]:
@@ -57,7 +61,7 @@ def unwatched(name: str) -> Callable[[object], Any]:
 
 
 _handed = attrgetter("handed")
-_base = attrgetter("base")
+_owns_memory = attrgetter("flags.owndata")
 
 
 class Watch:
@@ -76,10 +80,12 @@ class Watch:
         seen = list(map(_handed, owners))
         is_same = seen == self._kept
         # A reference that exists now may write after the values are read, and be gone at the next
-        # look. The memory of another array, its base, may have any number of references.
-        is_shared = any(
+        # look. Memory of others may have any number of references, and a weak one is not counted,
+        # but nobody can make either without asking for the array.
+        is_shared = not _COUNTS_REFERENCES or any(
             max(map(sys.getrefcount, map(array, owners)), default=0) > _own_references()
-            or (not is_same and any(map(is_not, map(_base, map(array, owners)), repeat(None))))
+            or (not is_same and not all(map(_owns_memory, map(array, owners))))
+            or (not is_same and any(map(getweakrefcount, map(array, owners))))
             for array in self._arrays
         )
         if is_shared or not is_same:
@@ -99,6 +105,6 @@ class _Owner:
 
 @cache
 def _own_references() -> int:
-    """Return the number of references to an array of one owner, as ``_are_shared`` counts them."""
+    """Return the number of references to an array of one owner, as ``Watch.look`` counts them."""
     # Versions of Python count the references of a running function differently.
     return max(map(sys.getrefcount, map(unwatched("array"), [_Owner()])))
