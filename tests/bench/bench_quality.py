@@ -29,11 +29,12 @@ _EQUAL = 1.03  # the noise of medians of processor time is 3 %
 BEFORE_TONE = "66bc64b~1"
 """The last commit whose shading is not scene-linear."""
 DRAFTS = """
-import statistics, time, viewer
+import statistics, sys, time, viewer
 from viewer.loading import bundled_body, bundled_files
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rigs.scene import scene_box
+# Older checkouts have this module in another package.
+scene_box = sys.modules[type(viewer.load()).__module__].scene_box
 times = []
 with Offscreen() as offscreen, offscreen.context:
     for files in (bundled_files(), [bundled_body()]):
