@@ -18,6 +18,7 @@ from viewer.rendering.camera import camera_axes
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import joint_label
 
 VIEW_RADIUS = 1.2 * RADIUS
 
@@ -50,6 +51,7 @@ def test_view_ring_rotates_the_joint_by_the_angle_on_screen(arm):
     to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
     drag_along(arm, around(center, VIEW_RADIUS, 0.3, 1.1))
     wanted = rotation_vector_to_matrix(0.8 * to_eye) @ before
+    assert arm.state.history.undone_next.name.startswith("rotate joint ")
     # ImGui rounds the pointer to whole points: half a point at both ends, 94 points from the
     # middle.
     assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=0.012)
@@ -212,6 +214,8 @@ def test_root_is_dragged_directly_or_by_its_arrow(drive):
     x, y = joint_seen(hand, 0)
     drag_along(hand, [(x, y), (x + 10, y), (x + 40, y - 25)])
     assert_allclose(joint_seen(hand, 0), (x + 40, y - 25), atol=0.01)
+    label = joint_label(hand.state.actor.figure.require_skeleton(), 0)
+    assert hand.state.history.undone_next.name == f"move joint {label}"
     first = hand.state.actor.pose.figure_translation.copy()
     x, y = joint_seen(hand, 0)
     drag_along(hand, [(x, y - 45), (x, y - 60), (x + 7, y - 90)])  # the upward arrow

@@ -44,6 +44,7 @@ from viewer.app.posing.rotate_tool import (
 )
 from viewer.app.posing.toolbar import cancel_drag, no_tool, selected
 from viewer.data_classes import dataclass
+from viewer.phrases import printable
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import unit
@@ -175,7 +176,10 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         drag.actor.pose = drag.outcome.pose
     if not imgui.is_mouse_down(_LEFT):
         posing.drag = None
-        if not drag.has_moved:
+        if drag.has_moved:
+            name = joint_label(drag.actor.figure.require_skeleton(), drag.handle.joint)
+            state.history.name = f"{posing.tool} joint {printable(name, 60)}"
+        else:
             choose_joint(state)  # a joint's dot may be under a ring or an arrow
     return True
 
