@@ -19,10 +19,11 @@ from viewer.app.core.view_frame import view_frame
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
 from viewer.app.rigging import work
+from viewer.app.rigging.joint_editing.starts import starts
 from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import discard, trial_clip
-from viewer.app.rigging.rigging import Rigging, current_template
+from viewer.app.rigging.rigging import SHAPE, Rigging, choose_template, current_template
 from viewer.autorig.alignment.pose_fit import FittedJoints
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.confidence import Finding
@@ -579,3 +580,10 @@ def test_skeleton_is_found_in_the_shape_with_the_chosen_settings(drive, texts, m
     assert "2 pairs mirrored" in str(result.rigged.lines[0])
     assert result.method == "heat" and visible(hand) == ["beast bound"]
     assert_allclose(seen(hand, 1), target.figure.mesh.positions, atol=1e-9)
+
+
+def test_editing_is_not_offered_with_a_template_where_joints_come_from_the_shape(rigging):
+    hand = rigging(placed=False)
+    assert starts(hand.state)["template"] == "template, fitted"
+    choose_template(hand.state, SHAPE)
+    assert starts(hand.state)["template"] == "joints from shape"

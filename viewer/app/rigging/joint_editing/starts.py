@@ -17,7 +17,14 @@ from viewer.app.rigging.joint_editing.binding import weight_settings
 from viewer.app.rigging.joint_editing.rest_meshes import plane_of, rest_mesh
 from viewer.app.rigging.joint_editing.state import NOT_KEPT, JointEditing, TemplateFit, show
 from viewer.app.rigging.placing import target_place
-from viewer.app.rigging.rigging import Rigging, Template, choose_target, target_mesh, targets
+from viewer.app.rigging.rigging import (
+    SHAPE,
+    Rigging,
+    Template,
+    choose_target,
+    target_mesh,
+    targets,
+)
 from viewer.app.rigging.work import AlignedStart, aligned_start, begin_work, put_question
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.binding import enclosed
@@ -80,7 +87,8 @@ def starts(state: AppState) -> dict[str, str]:
     if actor.figure.is_attached and not no_edit(actor.figure):
         found["own"] = "own joints"
     if any(actor is one for one in targets(state)):
-        found["template"] = "template, fitted"
+        is_shape = state.of(Rigging).template_key == SHAPE
+        found["template"] = "joints from shape" if is_shape else "template, fitted"
     if actor.figure.mesh is not None:
         found["root"] = "one joint"
     return found
