@@ -38,6 +38,7 @@ def test_files_are_frames_in_natural_order(tmp_path):
         (["a_1.obj", "b_1.obj"], [0, 1], 0),
         (["a_1.obj", "a_01.obj"], [0, 1], 0),
         (["7.ply", "8.ply"], [7, 8], 0),
+        (["f_1.obj", "f_2.obj", "g_7.obj"], [0, 1, 2], 1),
     ],
 )
 def test_names_that_differ_by_a_number_number_the_frames(names, numbers, missing):

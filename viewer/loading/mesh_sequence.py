@@ -199,6 +199,17 @@ def frame_numbers(paths: Sequence[Path]) -> tuple[Ints, list[Diagnostic]]:
     names = {path.with_name(_NUMBER.sub("", path.stem) + path.suffix) for path in paths}
     values = [int(each[0]) for each in found if each is not None]
     steps = np.diff(np.array(values, dtype=np.float64))
+    if 1 < len(names) < len(paths):
+        # Some names have several numbers: a file of another sequence may be among them.
+        shown = [printable(path.name, 60) for path in sorted(names)]
+        return counted_up, [
+            note(
+                "F007.frames-names: files of {n} different names are frames of one mesh, one after "
+                "the other: {names}; give only those of one sequence",
+                n=len(names),
+                names=listed(shown[:3] + ["…"] * (len(shown) > 3)),
+            )
+        ]
     if len(names) > 1 or not (steps > 0).all() or values[-1] >= 2**31:
         # Files of several names, or two spellings of one number, are frames one after the other.
         return counted_up, []
