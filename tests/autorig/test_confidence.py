@@ -14,6 +14,7 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import TransferSettings
 from viewer.autorig.solid import solid_of
 from viewer.errors import RigError
+from viewer.loading import bundled_body, load
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.skin import skin_from_entries
 
@@ -163,6 +164,38 @@ def test_what_the_user_has_placed_is_not_judged(how, away):
     pose = rest_pose(figure.skeleton)
     found = alignment(0.5, how, away)
     assert judge(figure, pose, figure, pose, figure.mesh, found) == ()
+
+
+@pytest.fixture(scope="module")
+def person():
+    """The bundled body, and its solid."""
+    figure = load(bundled_body()).actors[0].figure
+    return figure, solid_of(figure.mesh.positions, figure.mesh.triangles, 24)
+
+
+def leaning(person, degrees, gap=0.02, up=None):
+    """Return the findings about a rig of the person that leans forward."""
+    figure, solid = person
+    pose, bowed = rest_pose(figure.skeleton), rest_pose(figure.skeleton)
+    bowed.dofs[0] = np.radians(degrees)
+    found = judge(figure, pose, figure, bowed, figure.mesh, alignment(gap), (solid, solid), up=up)
+    return {finding.sentence[5:].split(":")[0]: finding for finding in found}
+
+
+def test_trunk_that_lies_is_a_figure_of_another_kind(person):
+    assert leaning(person, 30.0)["trunk"].rating > 0.5
+    found = leaning(person, 60.0)["trunk"]
+    # The trunk at rest leans by 2 degrees.
+    assert found.value == pytest.approx(60.0, abs=4.0) and found.rating == 0.0
+
+
+def test_trunk_is_upright_along_the_stated_up_axis(person):
+    assert leaning(person, 90.0, up="z")["trunk"].value == pytest.approx(0.0, abs=4.0)
+    assert leaning(person, 0.0, up="z")["trunk"].rating == 0.0
+
+
+def test_person_who_bows_fits_closely(person):
+    assert "trunk" not in leaning(person, 60.0, gap=0.009)
 
 
 def test_wrong_rig_is_refused_unless_insisted_on():

@@ -7,6 +7,8 @@ says little. A rig is right if the limbs of the template are where the target ha
 - bones are inside the solid, as deep as in the template, and along the middle of its legs: those
   of a bird or of a robot may bend where a person's do not;
 - the solid is as thick as that of the template: a picture cut out of cardboard is not;
+- the trunk is as upright as in the template, unless the surfaces agree closely: a bird with its
+  wings for arms leans forward, a person whose rig is a fox's lies on the back;
 - bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
 
@@ -24,11 +26,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewer.autorig.alignment.surface_alignment import PART, AlignedBy, Alignment, misfit
+from viewer.autorig.alignment.orientation_search import axis_direction, nearest_axis
+from viewer.autorig.alignment.surface_alignment import (
+    DEFAULT_UP,
+    PART,
+    AlignedBy,
+    Alignment,
+    misfit,
+)
 from viewer.autorig.anatomy import LimbPair, arc_lengths
 from viewer.autorig.solid import Solid, solid_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
+from viewer.errors import RigError
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -36,6 +46,7 @@ from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.mesh import Mesh, triangle_areas, volume
 from viewer.rigs.pose import Pose
+from viewer.rigs.retargeting.mirror import joint_partners
 from viewer.rigs.skin import Skin
 from viewer.rigs.skinning import deform, joint_matrices
 from viewer.rigs.skinning.lbs import move
@@ -51,6 +62,8 @@ _REMEDY = (
 # Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
 # be apart; where none were found, only a shape that agrees everywhere shows that they are there.
 _FOUND_LIMBS, _NO_LIMBS = (0.045, 0.02), (0.03, 0.01)
+# Misfit up to which a trunk may lean: a person who bows fits as closely as one who stands upright.
+_SAME_KIND = 0.01
 _BEND = np.radians(40.0)  # rotation of every joint in the test pose
 _ALONG = np.linspace(0.1, 0.9, 9)  # places on a bone that are looked at
 _FOOT = 0.15  # part of a leg's path from its tip that is left out: toes may have no bones
@@ -110,10 +123,11 @@ def judge(
     alignment: Alignment,
     solids: tuple[Solid, Solid] | None = None,
     legs: tuple[LimbPair, ...] = (),
+    up: str | None = None,
 ) -> tuple[Finding, ...]:
     """Return what speaks for and against a rig of a target, made from that of a posed template.
 
-    ``legs``: those of the target, if they were found.
+    ``legs``: those of the target, if they were found. ``up``: its up axis, if it is stated.
     ``figure`` in ``figure_pose`` is the rigged target. Nothing is judged if the user has placed the
     template, or if a part of a figure, such as clothes, is where the template has it.
     """
@@ -129,12 +143,19 @@ def judge(
             solids = own, solid_of(target.positions, target.triangles)
     joints = joint_matrices(template, pose)[:, :3, 3]
     rigged = joint_matrices(figure, figure_pose)[:, :3, 3]
-    return findings(
-        Body(posed, mesh.triangles, skin, joints, solids[0]),
-        Body(target.positions, target.triangles, figure.require_skin(), rigged, solids[1]),
-        skeleton.parents,
-        alignment,
-        legs,
+    if up is None:
+        # A template that stays in its own frame has not been turned upright.
+        stays = nearest_axis(alignment.similarity.rotation @ axis_direction(template.up))
+        up = template.up if stays == template.up else DEFAULT_UP
+    return (
+        *findings(
+            Body(posed, mesh.triangles, skin, joints, solids[0]),
+            Body(target.positions, target.triangles, figure.require_skin(), rigged, solids[1]),
+            skeleton.parents,
+            alignment,
+            legs,
+        ),
+        *_upright(template, joints, rigged, axis_direction(up), alignment),
     )
 
 
@@ -255,6 +276,58 @@ def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> t
             good=0.75,
         ),
     )
+
+
+def _upright(
+    template: Figure, joints: Floats, rigged: Floats, up: Floats, alignment: Alignment
+) -> tuple[Finding, ...]:
+    """Return a finding about the trunk, none if the template has none or the surfaces agree.
+
+    ``joints``, ``rigged``: (J, 3), those of the posed template and of the target.
+    """
+    trunk = _trunk(template, joints)
+    if trunk is None or misfit(alignment, False) <= _SAME_KIND:
+        return ()
+    angles = []
+    for places, vertical in ((joints, axis_direction(template.up)), (rigged, up)):
+        way = unit(places[list(trunk[1])].mean(axis=0) - places[list(trunk[0])].mean(axis=0))
+        angles.append(float(np.degrees(np.arccos(np.clip(way @ vertical, -1.0, 1.0)))))
+    # Halfway: 40 degrees. Characters that are rigged well have up to 20, a bird with the arms of a
+    # person in its wings 46, animals with two legs for four, or the reverse, 50 to 95.
+    return (
+        Finding(
+            "R017.trunk: the trunk leans {value:.0f} degrees more or less than in the template",
+            abs(angles[1] - angles[0]),
+            wrong=55.0,
+            good=25.0,
+        ),
+    )
+
+
+def _trunk(figure: Figure, joints: Floats) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Return the first joints of the longest pairs of limbs at both ends of the trunk, or None."""
+    try:
+        partners = joint_partners(figure)
+    except RigError:
+        return None  # without symmetry, there are no pairs
+    parents = figure.require_skeleton().parents
+    reach = np.zeros(len(parents))
+    for joint in range(len(parents) - 1, -1, -1):
+        if (parent := int(parents[joint])) >= 0:
+            # Children come after their parents, so the joint's own reach is already final.
+            step = float(np.linalg.norm(joints[joint] - joints[parent]))
+            reach[parent] = max(reach[parent], reach[joint] + step)
+    firsts = [
+        joint
+        for joint, parent in enumerate(parents.tolist())
+        if joint < partners[joint] and parent >= 0 and partners[parent] == parent
+    ]
+    firsts.sort(key=lambda joint: -reach[joint])
+    others = [joint for joint in firsts if parents[joint] != parents[firsts[0]]]
+    if not others:
+        return None
+    one, other = ((joint, int(partners[joint])) for joint in (firsts[0], others[0]))
+    return one, other
 
 
 def _lengths(body: Body, bones: Ints) -> Floats:

@@ -114,7 +114,8 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     out = newly_outside(template, pose, posed, target, joints, transferred)
     residual = residual_of(figure, rest.pose, np.eye(4), target)
     with part_of_work(span=(0.95, 1.0)):
-        found = judge(plain, given, figure, rest.pose, target, alignment, met.solids, met.legs)
+        up = how.alignment.up
+        found = judge(plain, given, figure, rest.pose, target, alignment, met.solids, met.legs, up)
     if not how.insists and (why := refusal(found)):
         raise RigError(why)
     lines = [

@@ -497,7 +497,8 @@ def _with_known_method(
         return rigged  # the transfer has aligned the template itself
     known_alignment = replace(rigged.alignment, how=known.how, has_limbs=known.has_limbs)
     figure, pose = _unshaped(template)
-    found = judge(figure, pose, rigged.figure, rigged.pose, target, known_alignment)
+    up = placing.settings.up
+    found = judge(figure, pose, rigged.figure, rigged.pose, target, known_alignment, up=up)
     rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
     lines = (*doubts(found), *alignment_lines(known_alignment), *placing.lines, *rest)
     return replace(rigged, alignment=known_alignment, lines=lines, findings=found)
