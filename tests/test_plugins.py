@@ -16,7 +16,7 @@ from viewer.cli import run
 from viewer.commands.doctor import examine
 from viewer.diagnostics import CODES
 from viewer.errors import PluginError
-from viewer.exporters import EXPORTERS
+from viewer.exporters import EXPORTERS, usable_exporters
 from viewer.formats import FORMATS, all_suffixes
 from viewer.plugins import _installed, plugins_of, without_plugins
 from viewer.rigs import scalars
@@ -177,13 +177,15 @@ def test_error_of_a_plugin_is_one_line_with_its_package(text, message, install, 
     ("text", "message"),
     [
         ("ONE = 1", "expected a Scalar, found int"),
+        ("from viewer.rigs.scalars import Scalar\nONE = Scalar(max, 'One', kind='x')",
+         "expected a kind of sequential or diverging, found 'x'"),
         ("from viewer.rigs.scalars import Scalar\nONE = Scalar(lambda f, v: v, 'One')",
          r"expected finite values of shape \(7813,\), found shape \(7813, 3\)"),
         ("from viewer.rigs.scalars import Scalar\n"
          "ONE = Scalar(lambda f, v: [*[0] * 5, *[float('nan')] * 7808], 'One')",
          r"expected finite values of shape \(7813,\), found nan at vertex 5"),
     ],
-    ids=["type", "shape", "nan"],
+    ids=["type", "kind", "shape", "nan"],
 )  # fmt: skip
 def test_wrong_quantities_are_refused(text, message, install):
     (install("bad", [("scalars", "one", "bad_two:ONE")]) / "bad_two.py").write_text(text)
@@ -215,10 +217,11 @@ def test_command_of_a_plugin_runs(install, tmp_path, monkeypatch, capsys):
     [
         ("def run(a): return 1 / 0", "failed: ZeroDivisionError: division by zero"),
         ("def run(a): open('no/file')", "failed: FileNotFoundError: "),
+        ("def run(a): return 'done'", "expected an exit code from run, found str"),
         ("raise SystemExit(7)", "cannot be imported: SystemExit: 7"),
         ("run = 1\ndef add_arguments(p): p.nothing()", "failed: AttributeError: "),
     ],
-    ids=["exception", "file", "script", "arguments"],
+    ids=["exception", "file", "text", "script", "arguments"],
 )
 def test_error_of_a_command_is_one_line_with_its_package(text, message, install, capsys):
     place = install("tools", [("commands", "fail2", "tool_two")])
@@ -294,6 +297,26 @@ def test_error_of_an_exporter_names_its_package(changes, message, install, tmp_p
     with pytest.raises(PluginError, match=re.escape(message)):
         viewer.export(viewer.load("fox")[0], "a.vl")
     assert Path("a.vl").read_text() == "of before"
+
+
+def test_broken_module_is_imported_once(install):
+    """Menus list the exporters in every frame."""
+    place = install("lists", [("exporters", "vl", "lists"), ("panels", "notes", "lists")])
+    (place / "lists.py").write_text("import sys\nsys.imports_of_lists.append(1)\n1 / 0\n")
+    sys.imports_of_lists = tries = []
+    try:
+        for _ in range(3):
+            assert ".vl" not in {suffix for kind in usable_exporters() for suffix in kind.suffixes}
+        with pytest.raises(PluginError, match="vl\\): cannot be imported: ZeroDivisionError"):
+            viewer.export(viewer.load("fox")[0], "a.vl")
+        assert len(tries) == 1
+        (panel,) = plugins_of("panels")
+        for _ in range(2):
+            with pytest.raises(PluginError, match="notes\\): cannot be imported: ZeroDivision"):
+                panel.load()
+        assert len(tries) == 2
+    finally:
+        del sys.imports_of_lists
 
 
 CHECK = """

@@ -14,6 +14,7 @@ import viewer
 from viewer.commands import COMMANDS
 from viewer.commands._usage import (
     Parser,
+    checked_code,
     command_module,
     command_parser,
     guard_of,
@@ -113,7 +114,8 @@ def _dispatch(arguments: list[str]) -> int:
         with without_cache():
             return command.run(parsed)
     with guard_of(name):
-        return command.run(parsed)
+        code = command.run(parsed)
+    return checked_code(name, code)
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import field
 from functools import cache
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -57,9 +58,20 @@ class Plugin:
     """Module, and the object in it if it is not the module itself: ``module:object``."""
     distribution: str
     """Name and version of the installed package."""
+    _failures: list[ViewerError] = field(default_factory=list, compare=False, repr=False)
+    """The error of the import, which is tried once: menus and panels ask in every frame."""
 
     def load(self) -> Any:
         """Import the module, and return what the entry point names, with all that it must have."""
+        if self._failures:
+            raise self._failures[0].with_traceback(None)
+        try:
+            return self._imported()
+        except ViewerError as problem:
+            self._failures.append(problem)
+            raise
+
+    def _imported(self) -> Any:
         from importlib import import_module
         from operator import attrgetter
 

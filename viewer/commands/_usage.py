@@ -118,6 +118,15 @@ def guard_of(name: str) -> AbstractContextManager[None]:
     return nullcontext() if plugin is None else plugin.guarded("failed", may_exit=True)
 
 
+def checked_code(name: str, code: object) -> int:
+    """Return what a command's ``run`` returned: an exit code, or None, which is 0."""
+    if isinstance(code, int | None):
+        return code or 0
+    plugin = plugin_of("commands", name)
+    assert plugin is not None  # type checkers see to this program's commands
+    raise plugin.error(f"expected an exit code from run, found {type(code).__name__}")
+
+
 def is_plugged_command(word: str) -> bool:
     """Return whether a first argument is a plug-in's command; raise if it is a misspelt one."""
     from viewer.models import resolve

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from keyword import iskeyword
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -36,6 +36,8 @@ _LEAST = 0.001  # length in millimetres or percent that is shown instead of shor
 _ZERO = 1e-6  # rounding errors below this are 0
 
 ScalarKind: TypeAlias = Literal["sequential", "diverging", "discrete", "categorical"]
+_PluginKind: TypeAlias = Literal["sequential", "diverging"]
+_PLUGIN_KINDS: tuple[_PluginKind, ...] = get_args(_PluginKind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +139,7 @@ class Scalar:
     compute: Callable[[Figure, Floats], Floats]
     title: str
     unit: str = ""
-    kind: Literal["sequential", "diverging"] = "sequential"
+    kind: _PluginKind = "sequential"
 
 
 _PLUGGED: dict[str, tuple[Plugin, Scalar]] = {}
@@ -156,6 +158,10 @@ def _find_plugin(key: str) -> None:
     found = plugin.load()
     if not isinstance(found, Scalar):
         raise plugin.error(f"expected a Scalar, found {type(found).__name__}")
+    if found.kind not in _PLUGIN_KINDS:
+        raise plugin.error(
+            f"expected a kind of {' or '.join(_PLUGIN_KINDS)}, found {found.kind!r:.80}"
+        )
     _PLUGGED[key] = plugin, found
     SCALARS[key] = _Quantity(found.title, "", "a mesh", found.kind, found.unit)
 
