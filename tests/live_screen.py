@@ -22,6 +22,8 @@ class Screen:
         self.state = make_state(scene or viewer.load())
         receiver = Receiver("127.0.0.1", 0) if vmc else None
         self.live = self.state.put(Live(self.server, receiver))
+        self.frame = threading.Lock()
+        """Held during a frame: a test that edits holds it as well."""
         self._is_over = False
         self._thread = threading.Thread(target=self._run)
         self.server.start()
@@ -29,8 +31,11 @@ class Screen:
 
     def _run(self):
         while not self._is_over:
-            self.state.clock.pose(self.state.actor)
-            advance_live(self.state)
+            with self.frame:
+                self.state.observe()
+                if self.state.clock.pose(self.state.actor):
+                    self.state.history.follow(self.state.update_version(), self.state.clock.time)
+                advance_live(self.state)
             time.sleep(0.001)
 
     def wait(self, condition):

@@ -213,6 +213,122 @@ def test_what_programs_send_is_no_edit(screen, live):
     assert not can_undo(screen.state)
 
 
+def edit(screen, angle, index=0):
+    """Bend the second joint about z as a slider does."""
+    actor = screen.state.scene.actors[index]
+    with screen.frame:
+        screen.state.observe()
+        actor["joint_1"] = [0.0, 0.0, angle]
+
+
+def is_read(live, name, angle):
+    return lambda: live[name]["joint_1"][2] == pytest.approx(angle)
+
+
+def test_pose_that_the_user_sets_is_read_in_place_and_not_sent_back(screen, live, monkeypatch):
+    first, sent = live["first"], []
+    pose = first.pose
+    ask = live._ask
+    monkeypatch.setattr(live, "_ask", lambda do, *rest: sent.append(do) or ask(do, *rest))
+    for angle in (QUARTER, 0.0, 0.5):  # dragged, reset, dragged again
+        edit(screen, angle)
+        screen.wait(is_read(live, "first", angle))
+    live.update()
+    assert live["first"].pose is pose
+    assert "pose" not in sent
+    assert "edits" in sent
+    assert is_at(screen, [1.0 + math.cos(0.5), math.sin(0.5), 0.0])()
+    with screen.frame:
+        screen.state.observe()
+        assert can_undo(screen.state)  # the edits are still those of the user
+    screen.wait(is_read(live, "first", 0.0))  # undone
+
+
+def test_added_actor_reads_the_user_and_other_numbers_may_be_set(screen, live):
+    actor = live.add(bar())
+    edit(screen, QUARTER, 1)
+    screen.wait(is_read(live, "bar", QUARTER))
+    actor.pose.figure_translation[1] = 5.0
+    screen.wait(is_at(screen, [1.0, 6.0, 0.0]))
+
+
+def test_pose_of_the_program_wins(screen, live):
+    first = live["first"]
+    with screen.frame, live._lock:
+        first["joint_1"] = [0.0, 0.0, QUARTER]
+        screen.state.observe()
+        screen.state.scene.actors[0]["joint_1"] = [0.0, 0.0, 0.5]
+    live.update()
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+    live.update()
+    assert first["joint_1"][2] == pytest.approx(QUARTER)
+
+
+def test_pose_of_the_program_that_waits_replaces_an_edit_of_the_same_frame(screen, live):
+    first, server = live["first"], screen.server
+    with screen.frame:
+        first["joint_1"] = [0.0, 0.0, QUARTER]
+        live.update()  # waits for the frame
+        screen.state.observe()
+        screen.state.scene.actors[0]["joint_1"] = [0.0, 0.0, 0.5]
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+    live.update()
+    assert first["joint_1"][2] == pytest.approx(QUARTER)
+    assert not server._poses.edits
+
+
+def test_both_programs_read_the_user_and_one_that_comes_later_what_is_shown(screen, live):
+    live["first"]
+    with viewer.connect(screen.path) as other:
+        other["first"]
+        edit(screen, QUARTER)
+        for each in (live, other):
+            screen.wait(is_read(each, "first", QUARTER))
+        live["first"]["joint_1"] = [0.0, 0.0, 0.5]
+        live.update()
+        screen.wait(is_at(screen, [1.0 + math.cos(0.5), math.sin(0.5), 0.0]))
+    with viewer.connect(screen.path) as late:
+        assert late["first"]["joint_1"][2] == pytest.approx(0.5)
+        late.update()
+        assert late["first"]["joint_1"][2] == pytest.approx(0.5)
+
+
+def test_motion_of_the_window_is_not_read_but_edits_at_its_time_are(screen, live):
+    vectors = np.zeros((3, 2, 3))
+    vectors[2, 1] = [0.0, 0.0, QUARTER]
+    actor = live.add(viewer.animate(bar(), vectors, fps=10.0))
+    own = actor.pose.copy()
+    live.time = 0.2
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+    live.update()
+    assert np.array_equal(actor.pose.values, own.values)
+    edit(screen, 0.5, 1)
+    screen.wait(is_read(live, "motion", 0.5))
+    live.time = 0.0
+    assert live["motion"]["joint_1"][2] == pytest.approx(0.5)
+
+
+def test_weights_that_the_window_has_not_are_kept(screen, live):
+    shapes = BlendShapes(("height",), np.ones((1, 3, 3)), space=Upwards())
+    actor = live.add(replace(bar(), blend_shapes=shapes))
+    actor.pose.shape_weights = np.array([2.0])
+    live.update()
+    edit(screen, QUARTER, 1)
+    screen.wait(is_read(live, "bar", QUARTER))
+    assert actor.pose.shape_weights.tolist() == [2.0]
+
+
+def test_weights_and_scale_that_the_user_sets_are_read(screen, live):
+    shapes = BlendShapes(("height",), np.ones((1, 3, 3)))
+    actor = live.add(replace(bar(), blend_shapes=shapes))
+    with screen.frame:
+        screen.state.observe()
+        screen.state.scene.actors[1].pose.shape_weights = np.array([0.25])
+        screen.state.scene.actors[1].pose.figure_scale = 2.0
+    screen.wait(lambda: live["bar"].pose.figure_scale == 2.0)
+    assert actor.pose.shape_weights.tolist() == [0.25]
+
+
 def test_programs_share_a_window_and_leave_what_they_sent(screen):
     with viewer.connect(screen.path) as one, viewer.connect(screen.path) as two:
         one.add(bar("one"))

@@ -11,6 +11,7 @@ import numpy as np
 from viewer.app.actors.following import stop_following
 from viewer.app.closing import Closing
 from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.scene_version import ActorVersion, SceneVersion
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.live.messages import Message, MessageError, told_of
@@ -39,6 +40,8 @@ class Live:
     """That humanoid, once it was moved or sent."""
     sent: object = None
     """Key of the pose that was sent last."""
+    version: SceneVersion | None = None
+    """The scene at the end of the last frame."""
     lacks_humanoid: Scene | None = None
     """Scene without a humanoid, about which a message was shown."""
 
@@ -85,6 +88,7 @@ def advance_live(state: AppState) -> None:
     if server is None:
         return
     server.follow(state.scene.actors)
+    _note_poses(state, live, server, _by_user)
     for request in server.take():
         try:
             answer = _ACTIONS[request.message.do](state, server, request)
@@ -101,8 +105,41 @@ def advance_live(state: AppState) -> None:
             actor.pose = pose
     if _perform(state, live) or poses:
         state.history.follow(state.update_version(), state.clock.time)
+    _note_poses(state, live, server, lambda state, one: False)
     _send_performance(state, live)
     state.stats.live = live.lines()
+
+
+def _note_poses(
+    state: AppState,
+    live: Live,
+    server: Server,
+    is_edit: Callable[[AppState, ActorVersion], bool],
+) -> None:
+    """Let programs read the poses that have changed since the last call and are edits."""
+    if state.version is live.version:
+        return
+    before = () if live.version is None else live.version.actors
+    live.version = state.version
+    known = {one.actor: one.pose for one in before}
+    numbers = {actor: number for number, actor in server.actors.items()}
+    changed = [
+        one
+        for one in state.version.actors
+        if one.actor in numbers and one.pose != known.get(one.actor, one.pose)
+    ]
+    if changed:
+        server.note(
+            {
+                numbers[one.actor]: one.actor.pose.copy() if is_edit(state, one) else None
+                for one in changed
+            }
+        )
+
+
+def _by_user(state: AppState, one: ActorVersion) -> bool:
+    """Return whether the user has set a pose, not the clock."""
+    return one.clip is None or state.history.is_by_hand(one)
 
 
 def _perform(state: AppState, live: Live) -> bool:

@@ -82,6 +82,8 @@ class Live:
 
     A thread looks for them 60 times per second: new poses and numbers changed in place, colours,
     placements and visibility, actors added to or removed from ``scene.actors``, and ``scene.time``.
+    It also changes the poses of these actors, in place, as the user does in the window; a pose that
+    the program has changed itself is sent instead.
     """
 
     _owns = False
@@ -92,6 +94,8 @@ class Live:
         """The actors that this program shows; those of others are fetched by ``live[name]``."""
         self._sent: dict[Actor, _Sent] = {}
         self._time: float | None = None
+        self._n_edits = 0
+        """Number of the last edit of the user that was read."""
         self._lock = threading.RLock()
         self._is_over = threading.Event()
         self._loss: ViewerError = _ClosedError("the window was closed")
@@ -127,6 +131,7 @@ class Live:
         with self._lock:
             own = [actor for actor in self.scene.actors if name in (actor.name, actor.title)]
             if own:
+                self._read_edits()
                 return own[0]
             for number, title in self._get()["actors"]:
                 if name == title:
@@ -180,15 +185,34 @@ class Live:
             self.update()
 
     def update(self) -> None:
-        """Send all changes now, and wait until the window has them; raises if one does not fit."""
+        """Send all changes now, and wait until the window has them; read those of the user.
+
+        Raises ``ViewerError`` if a change does not fit.
+        """
         with self._lock:
             self._require_open()
             try:
+                self._read_edits()
                 self._send_all()
             except ViewerError:
                 raise
             except Exception as problem:  # a value that cannot be converted
                 raise ViewerError(told_of(problem)) from problem
+
+    def _read_edits(self) -> None:
+        """Set the poses that the user has set in the window, unless the program has changed them.
+
+        They are not sent back: the window has them.
+        """
+        if not self._sent:
+            return
+        answer = self._ask("edits", {"since": self._n_edits})
+        actors = {sent.number: (actor, sent) for actor, sent in self._sent.items()}
+        for row, (number, edit, scale) in enumerate(answer.facts["edits"]):
+            self._n_edits = max(self._n_edits, edit)
+            if number in actors:
+                values, weights = answer.arrays[2 * row : 2 * row + 2]
+                _set_pose(*actors[number], values, weights, scale)
 
     def _send_all(self) -> None:
         for actor in [each for each in self._sent if each not in self.scene.actors]:
@@ -484,6 +508,26 @@ def _failure(folder: Path, code: int) -> ViewerError:
     told = (lines or [f"exit code {code}"])[-1].removeprefix("viewer: ")
     kind = RenderError if code == RenderError.exit_code else ViewerError
     return kind(told.removeprefix("error: "))
+
+
+def _set_pose(actor: Actor, sent: _Sent, values: Values, weights: Values, scale: float) -> None:
+    """Set a pose of the window in place, unless the program has changed it or has other joints."""
+    pose = actor.own_pose
+    if pose is None or pose.values.shape != values.shape:
+        return
+    if sent.pose.updated(*_numbers(pose)) is not sent.pose:
+        return
+    if _needs_files(actor):
+        weights = pose.shape_weights  # the window has their result
+    edited = Pose(np.array(values), pose.n_dofs, np.array(weights), scale)
+    # What the program changes meanwhile is kept if the user has not changed it, too.
+    # Bits are compared, as in keys: 0.0 and -0.0 differ.
+    changed = np.array(pose.values, float).view(np.int64) != edited.values.view(np.int64)
+    pose.values[changed] = edited.values[changed]
+    if not np.array_equal(pose.shape_weights, edited.shape_weights):
+        pose.shape_weights = edited.shape_weights.copy()
+    pose.figure_scale = scale
+    sent.pose = NumberKey(*_numbers(edited))
 
 
 def _needs_files(actor: Actor) -> bool:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from pathlib import Path
 from types import NoneType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -101,12 +101,45 @@ class Request:
         return Message("ok", {**self.facts, **told}, arrays)
 
 
+class Edit(NamedTuple):
+    """A pose that the user has set in the window."""
+
+    number: int
+    """Later edits have larger numbers."""
+    pose: Pose
+
+
 @dataclass(slots=True)
 class _Poses:
-    """Poses that are shown in the next frame, by the number of their actor."""
+    """Poses on their way to the window and from it, by the number of their actor."""
 
     lock: threading.Lock = field(default_factory=threading.Lock)
     latest: dict[int, Pose] = field(default_factory=dict)
+    """Poses of programs that are shown in the next frame."""
+    edits: dict[int, Edit] = field(default_factory=dict)
+    """Poses that the user has set and nothing has changed since."""
+    n_edits: int = 0
+
+    def put(self, actor: int, pose: Pose) -> None:
+        """Let a program's pose replace those before it, also one of the user that is unread."""
+        with self.lock:
+            self.latest[actor] = pose
+            self.edits.pop(actor, None)
+
+    def note(self, poses: Mapping[int, Pose | None]) -> None:
+        """Note poses that the user has set; None for an actor that something else has moved."""
+        with self.lock:
+            for actor, pose in poses.items():
+                if pose is None:
+                    self.edits.pop(actor, None)
+                elif actor not in self.latest:  # else a program's pose replaces it in this frame
+                    self.n_edits += 1
+                    self.edits[actor] = Edit(self.n_edits, pose)
+
+    def since(self, number: int) -> dict[int, Edit]:
+        """Return the edits after one."""
+        with self.lock:
+            return {actor: edit for actor, edit in self.edits.items() if edit.number > number}
 
 
 class Server:
@@ -176,6 +209,13 @@ class Server:
             found, self._poses.latest = self._poses.latest, {}
         return found
 
+    def note(self, poses: Mapping[int, Pose | None]) -> None:
+        """Let programs read poses that the user has set, by the actor's number.
+
+        None takes back the one of an actor that something else has moved.
+        """
+        self._poses.note(poses)
+
     def follow(self, actors: Iterable[Actor]) -> None:
         """Give numbers to the actors that a scene has now."""
         known = {id(actor): number for number, actor in self.actors.items()}
@@ -219,7 +259,7 @@ class Server:
                 is_known = greeting.is_over
                 try:
                     message = read(receive) if is_known else read(receive, FIRST)
-                    self.counts.messages += 1
+                    self.counts.messages += message.do != "edits"  # asked for 60 times per second
                     answer = self._answer(message) if is_known else greeting.answer(message)
                     if greeting.is_over and not is_known:
                         receive = receiver(client)
@@ -248,10 +288,11 @@ class Server:
         if message.do == "pose":
             number = message.index("actor")
             pose = self._pose(message, self._actor(number))
-            with self._poses.lock:
-                self._poses.latest[number] = pose
+            self._poses.put(number, pose)
             self.wake()
             return Message("ok", {})
+        if message.do == "edits":
+            return self._edits(message.index("since"))
         if message.do not in REQUESTS:
             raise MessageError(f"unknown message {printable(message.do, 60)}")
         if "actor" in message.facts and message.do != "put":
@@ -268,6 +309,15 @@ class Server:
         if found is None:
             raise MessageError(f"no actor {number}: it was removed, or the scene was replaced")
         return found
+
+    def _edits(self, since: int) -> Message:
+        """Return the poses that the user has set since an edit, of actors that are still there."""
+        told, arrays = list[list[float]](), list[Values]()
+        for actor, edit in self._poses.since(since).items():
+            if actor in self.actors:
+                told.append([actor, edit.number, float(edit.pose.figure_scale)])
+                arrays += [edit.pose.values, edit.pose.shape_weights]
+        return Message("ok", {"edits": told}, arrays)
 
     def _pose(self, message: Message, actor: Actor) -> Pose:
         """Return the pose of a message, which must fit the actor's figure."""

@@ -245,10 +245,10 @@ class History:
         )
 
     def _take(self, version: SceneVersion, time: float) -> _Snapshot:
-        by_hand = tuple(map(self._is_by_hand, version.actors))
+        by_hand = tuple(map(self.is_by_hand, version.actors))
         return _Snapshot(version, by_hand, time, self._kept())
 
-    def _is_by_hand(self, now: ActorVersion) -> bool:
+    def is_by_hand(self, now: ActorVersion) -> bool:
         """Return whether an actor's pose differs from the one set by the clock from its clip."""
         clocked = self._clocked.get(now.actor)
         if clocked is None or clocked.clip is not now.clip or clocked.offset != now.offset:
