@@ -364,3 +364,13 @@ def test_frame_writes_only_uniforms_that_changed(monkeypatch):
     assert (turned != first).any()
     # Those of the surface and of the grid: lights follow the camera, and its lens is the same.
     assert sorted(written) == ["u_model_view", "u_model_view", "u_normal_matrix", "u_up"]
+
+
+@pytest.mark.parametrize("count", [1, 40])  # the second is a crowd
+@pytest.mark.parametrize("joints", [None, [[0, 0, 0], [0, 1, 0]]])
+def test_mesh_without_vertices_draws_nothing(joints, count):
+    weights = None if joints is None else np.zeros((0, 2))
+    faces = np.zeros((0, 3), int)
+    empty = viewer.figure(np.zeros((0, 3)), faces, joints=joints, weights=weights)
+    drawn = viewer.render(Scene([viewer.Actor(empty) for _ in range(count)]), (32, 24))
+    np.testing.assert_array_equal(drawn, viewer.render(Scene([]), (32, 24)))

@@ -331,7 +331,7 @@ def _large(
 
 def _kind_of(figure: Figure) -> tuple[bool, bool]:
     """Return whether a figure is skinned without outlines, and if expressions change materials."""
-    if figure.mesh is None or not figure.is_attached:
+    if figure.mesh is None or not figure.mesh.n_vertices or not figure.is_attached:
         return False, False
     shapes = figure.blend_shapes
     has_outline = any(material.outline is not None for material in figure.mesh.materials)
@@ -346,7 +346,9 @@ def is_culled(figure: Figure, options: DisplayOptions) -> bool:
 
 def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
     """Return whether a figure's surface is drawn."""
-    return figure.mesh is not None and (options.show != "skeleton" or figure.skeleton is None)
+    mesh = figure.mesh
+    has_vertices = mesh is not None and mesh.n_vertices > 0
+    return has_vertices and (options.show != "skeleton" or figure.skeleton is None)
 
 
 def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:

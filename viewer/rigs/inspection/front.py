@@ -97,7 +97,7 @@ def _vote(actor: Actor, up: Floats) -> Floats:
     if not names:
         mesh = actor.figure.mesh
         way = np.zeros(3)
-        if mesh is not None and actor.figure.skeleton is None:
+        if mesh is not None and mesh.n_vertices and actor.figure.skeleton is None:
             some = mesh.positions[:: max(mesh.n_vertices // _MOST_VERTICES, 1)]
             way = _from_soles(apply_transform(actor.placement, some), up)
         return _unit(way, _SURE)
