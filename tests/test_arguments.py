@@ -68,6 +68,10 @@ WRONG = {
         ACTOR, "a.glb", options=3
     ),
     "speed: expected a number or None, found str": lambda: viewer.video(ACTOR, "a.gif", speed="x"),
+    "orthographic: expected bool, found list": lambda: viewer.render(ACTOR, orthographic=[1]),
+    "azimuth: expected a finite number, found inf": lambda: viewer.render(
+        ACTOR, azimuth=float("inf")
+    ),
     "camera: expected Camera or None, found int": lambda: viewer.show(ACTOR, 3),
     "gender: expected a text, found list": lambda: viewer.load(gender=["male"]),
     "max_size: expected a number, found str": lambda: viewer.load(max_size="x"),

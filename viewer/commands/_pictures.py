@@ -102,7 +102,7 @@ def render(
     """
     settings |= {"background": background, "quality": quality, "scalar": scalar}
     scene, shown = scene_of(scene, "render"), display_options("render", options, settings)
-    _check_types(size, distance, azimuth, inclination, look_at)
+    _check_types(size, distance, azimuth, inclination, look_at, orthographic)
     check_type("camera", camera, Camera, NoneType)
     if time is not None:
         scene = scene_at(scene, time)
@@ -184,7 +184,7 @@ def video(
 
     settings |= {"background": background, "quality": quality, "scalar": scalar}
     scene, shown = scene_of(scene, "video"), display_options("video", options, settings)
-    _check_types(size, distance, azimuth, inclination, look_at)
+    _check_types(size, distance, azimuth, inclination, look_at, orthographic)
     check_type("path", path, str, Path)
     check_type("frames", frames, range, NoneType)
     check_type("fps", fps, float, NoneType)
@@ -231,6 +231,7 @@ def _check_types(
     azimuth: float | None,
     inclination: float | None,
     look_at: str | None,
+    orthographic: bool,
 ) -> None:
     """Raise RigError for settings of another type than pictures need."""
     is_size = isinstance(size, Sequence | np.ndarray) and not isinstance(size, str)
@@ -239,6 +240,9 @@ def _check_types(
     angles = {"azimuth": azimuth, "inclination": inclination}
     for name, number in ({"distance": distance} | angles).items():
         check_type(name, number, float, NoneType)
+        if number is not None and not math.isfinite(number):
+            raise RigError(f"{name}: expected a finite number, found {number}")
+    check_type("orthographic", orthographic, bool)
     check_type("look_at", look_at, str, NoneType)
 
 
