@@ -264,17 +264,16 @@ def test_pose_of_the_program_wins(screen, live):
     assert first["joint_1"][2] == pytest.approx(QUARTER)
 
 
-def test_pose_of_the_program_that_waits_replaces_an_edit_of_the_same_frame(screen, live):
-    first, server = live["first"], screen.server
+def test_edit_is_not_told_while_a_pose_of_the_program_waits(screen, live):
+    first = live["first"]
     with screen.frame:
         first["joint_1"] = [0.0, 0.0, QUARTER]
         live.update()  # waits for the frame
-        screen.state.observe()
-        screen.state.scene.actors[0]["joint_1"] = [0.0, 0.0, 0.5]
+        screen.server.note({1: screen.state.scene.actors[0].pose.copy()})
+        assert not live._ask("edits", {"since": 0}).facts["edits"]
     screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
     live.update()
     assert first["joint_1"][2] == pytest.approx(QUARTER)
-    assert not server._poses.edits
 
 
 def test_both_programs_read_the_user_and_one_that_comes_later_what_is_shown(screen, live):
@@ -298,7 +297,8 @@ def test_motion_of_the_window_is_not_read_but_edits_at_its_time_are(screen, live
     vectors[2, 1] = [0.0, 0.0, QUARTER]
     actor = live.add(viewer.animate(bar(), vectors, fps=10.0))
     own = actor.pose.copy()
-    live.time = 0.2
+    with screen.frame:
+        screen.state.clock.seek(0.2)  # as the timeline does
     screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
     live.update()
     assert np.array_equal(actor.pose.values, own.values)
