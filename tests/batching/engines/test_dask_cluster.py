@@ -6,6 +6,7 @@ import signal
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -144,9 +145,30 @@ def test_items_at_fault_are_found_within_tasks(tmp_path):
 def test_workers_that_dask_gives_up_are_replaced(monkeypatch):
     monkeypatch.setitem(dask_cluster._CONFIG, "distributed.deploy.lost-worker-timeout", "1ms")
     monkeypatch.setattr(dask_cluster, "_FETCH", 0.5)  # results of such a worker are lost
+    monkeypatch.setattr(dask_cluster, "_ABSENT", 15.0)  # if it ends before Dask watches it
     # Dask may close a worker that has just restarted and runs another item: that is tried again.
     found = finished(Job(), items(20, crash=5), Limits(1, retries=1, cluster="local"))
     assert {n for n, one in found.items() if one.status != "done"} == {5}
+
+
+def test_workers_that_never_connect_are_replaced_under_another_name(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(dask_cluster.time, "monotonic", lambda: now[0])
+    scaled = []
+    cluster = SimpleNamespace(
+        worker_spec={0: {}, 1: {}}, workers={0: "nanny", 1: "nanny"}, scale=scaled.append
+    )
+    workers = dask_cluster._LocalWorkers(cluster, 2)
+    for seconds, connected in ((0.0, "01"), (50.0, "0"), (80.0, "0"), (89.0, "0")):
+        now[0] = 100.0 + seconds
+        workers.check(connected)
+    assert not scaled and cluster.worker_spec.keys() == {0, 1}
+    now[0] = 191.0
+    workers.check("0")
+    assert scaled == [2] and cluster.worker_spec.keys() == {0}
+    del cluster.workers[1]  # as Dask does after its own time limit
+    workers.check("0")
+    assert scaled == [2, 2]
 
 
 def test_two_thousand_files_of_which_some_are_broken(address, tmp_path):

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import astuple, field, replace
-from functools import partial
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -45,6 +44,8 @@ _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _PER_WORKER = 3  # tasks assigned to each worker: one runs while the next ones are transferred
 _COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leave
 _ALONE = 60.0  # seconds without any worker before the batch fails
+_RESTARTING = 240.0  # the same for local workers, which are replaced
+_ABSENT = 90.0  # seconds after which an absent local worker is replaced: Dask waits for it for 60 s
 _RETRIED = ("crashed", "timeout", "memory")
 _CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
 _FETCH = 10.0  # seconds after which results are asked for again; they are a few kB each
@@ -135,14 +136,13 @@ class _Flight:
         self._batch = f"viewer-{uuid4().hex[:8]}-"
         self._numbers = itertools.count()
         self._n_workers, self._counted, self._seen = 0, -_COUNT_EVERY, time.monotonic()
-        # SLURM starts jobs when resources are free, and local workers are replaced.
-        self._can_wait = parse_cluster(limits.cluster or "local").kind != "address"
+        self._kind = parse_cluster(limits.cluster or "local").kind
         self._resources: dict[str, float] | None = None
         self._uses_gpu = bool(getattr(job, "uses_gpu", False))
         self._is_stopping = False
 
     def count_workers(self) -> None:
-        """Update the number of workers; raise if a scheduler has had none for a minute."""
+        """Update the number of workers; raise if there have been none for long."""
         now = time.monotonic()
         if now < self._counted + _COUNT_EVERY:
             return
@@ -153,9 +153,15 @@ class _Flight:
         self._resources = {"GPU": 1} if with_gpu and self._uses_gpu else None
         self._n_workers = len(with_gpu if self._resources else workers)
         self._counted = now
-        if workers or self._can_wait:
+        # SLURM starts jobs when resources are free, which may take days.
+        if workers or self._kind == "slurm":
             self._seen = now
-        elif now > self._seen + _ALONE:
+        elif self._kind == "local" and now > self._seen + _RESTARTING:
+            raise ViewerError(
+                f"--cluster local: no worker has started for {_RESTARTING:g} s; use --resume to "
+                "continue"
+            )
+        elif self._kind == "address" and now > self._seen + _ALONE:
             raise ViewerError(
                 f"--cluster: the scheduler has had no workers for {_ALONE:g} s; start some with: "
                 f"dask worker {self.limits.cluster} --nthreads 1"
@@ -376,8 +382,9 @@ def _connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Chec
                 else:
                     target = slurm_cluster(name, limits.memory, _CONFIG)
             stack.enter_context(target)
-            check = partial(_replace_workers, target, limits.workers)
-            if name.kind == "slurm":
+            if name.kind == "local":
+                check = _LocalWorkers(target, limits.workers).check
+            else:
                 check = SlurmJobs(target, limits.workers, limits.note).check
         try:
             with signals_blocked():
@@ -394,10 +401,28 @@ def _nothing_to_replace(workers: Iterable[str]) -> None:
     """Do nothing: these workers belong to the user."""
 
 
-def _replace_workers(cluster: Any, n_workers: int, connected: Iterable[str]) -> None:
-    """Start new workers for those that Dask has given up, since they did not restart in time."""
-    if len(cluster.workers) < n_workers:
-        cluster.scale(n_workers)
+class _LocalWorkers:
+    """The workers of a local cluster, of which those that have ended are replaced."""
+
+    def __init__(self, cluster: Any, n_workers: int) -> None:
+        self._cluster, self._n_workers = cluster, n_workers
+        self._seen: dict[Any, float] = {}
+        """When each worker was connected last, or else was first missed: monotonic seconds."""
+
+    def check(self, connected: Iterable[str]) -> None:
+        """Start new workers for those that Dask has given up, or does not know to have ended."""
+        names, now = set(connected), time.monotonic()
+        wanted = list(self._cluster.worker_spec)
+        self._seen = {
+            name: now if str(name) in names else self._seen.get(name, now) for name in wanted
+        }
+        # Dask does not notice if a worker ends in the instant after its start, before its nanny
+        # watches it. A spec with another name replaces it; the nanny without a spec is closed.
+        absent = [name for name in wanted if now > self._seen[name] + _ABSENT]
+        for name in absent:
+            del self._cluster.worker_spec[name]
+        if absent or len(self._cluster.workers) < self._n_workers:
+            self._cluster.scale(self._n_workers)
 
 
 def _local_cluster(limits: Limits, folder: str) -> Any:
