@@ -271,7 +271,7 @@ def test_report_states_how_the_alignment_was_found(rigging, texts):
 
 def test_rig_that_is_probably_wrong_is_kept_or_discarded(rigging, texts, monkeypatch):
     doubt = Finding("R017.inside: only {value:.0%} of the bones are inside the mesh", 0.2, 0.3, 0.7)
-    monkeypatch.setattr(work, "judge", lambda *_: (doubt,))
+    monkeypatch.setattr(work, "judge", lambda *_, **__: (doubt,))
     hand = rigging(placed=False)
     hand.click("Align")
     hand.finish_job()
