@@ -591,11 +591,11 @@ def _ways_out(
 
 def _smoothed(curves: Floats, width: float) -> Floats:
     """Return the moving averages of curves (..., N, 3), with weights that fall linearly."""
+    from scipy.ndimage import convolve1d  # loads slowly, and only hands at the body need it
+
     half = max(1, round(width))
     weights = 1.0 - np.abs(np.arange(-half, half + 1)) / (half + 1.0)
-    padded = np.pad(curves, [(0, 0), (half, half), (0, 0)], mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(weights), axis=-2)
-    return windows @ (weights / weights.sum())
+    return np.asarray(convolve1d(curves, weights / weights.sum(), axis=-2, mode="nearest"))
 
 
 def _way_out(points: Floats, others: Floats, normals: Floats, fractions: Floats) -> Floats:
