@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from autorig.rigged_shapes import arm, mesh_of
 
+from viewer.autorig import pipeline
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.anatomy import Limb, LimbPair
@@ -13,6 +14,7 @@ from viewer.autorig.confidence import Body, confidence, doubts, findings, judge,
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import TransferSettings
 from viewer.autorig.solid import solid_of
+from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
 from viewer.rigs.pose import rest_pose
@@ -156,6 +158,12 @@ def test_surfaces_far_apart_are_a_doubt_with_its_number():
     assert refusal(found).startswith(
         "the rig is probably wrong: template and target are 6.0% of the size apart: use a template"
     )
+    # What helps if only the facing is wrong comes first.
+    alike = note("R004.facing: front and back look alike: if it is {back}, turn it", back="-z")
+    assert refusal(found, alike).startswith(
+        "the rig is probably wrong: template and target are 6.0% of the size apart: front and back "
+        "look alike: if it is -z, turn it; else use a template"
+    )
 
 
 @pytest.mark.parametrize("how, away", [("given", 0.0), ("landmarks", 0.0), ("in place", 0.2)])
@@ -198,7 +206,7 @@ def test_person_who_bows_fits_closely(person):
     assert "trunk" not in leaning(person, 60.0, gap=0.009)
 
 
-def test_wrong_rig_is_refused_unless_insisted_on():
+def test_wrong_rig_is_refused_unless_insisted_on(monkeypatch):
     figure = arm()
     positions, triangles = figure.mesh.positions, figure.mesh.triangles
     sheet = mesh_of(positions * [1.0, 1.0, 0.02], triangles)
@@ -210,3 +218,13 @@ def test_wrong_rig_is_refused_unless_insisted_on():
     kept = transfer(figure, pose, sheet, replace(how, insists=True))
     assert confidence(kept.findings) < 0.5
     assert "R017" in {line.code for line in kept.lines}
+    # The refusal also says that the figure may face the other way.
+    alike = note("R004.facing: front and back look alike")
+    align = pipeline.align_posed
+    monkeypatch.setattr(
+        pipeline,
+        "align_posed",
+        lambda *given: replace(found := align(*given), lines=(alike, *found.lines)),
+    )
+    with pytest.raises(RigError, match=": front and back look alike; else use a"):
+        transfer(figure, pose, sheet, how)

@@ -159,10 +159,16 @@ def judge(
     )
 
 
-def refusal(found: tuple[Finding, ...]) -> str:
-    """Return the reasons not to keep a rig, and what helps; empty if it is probably right."""
+def refusal(found: tuple[Finding, ...], facing: Diagnostic | None = None) -> str:
+    """Return the reasons not to keep a rig, and what helps; empty if it is probably right.
+
+    ``facing``: the message that front and back look alike, and what helps if they are swapped.
+    """
     reasons = "; ".join(str(line) for line in doubts(found))
-    return f"the rig is probably wrong: {reasons}: {_REMEDY}" if reasons else ""
+    if not reasons:
+        return ""
+    remedy = _REMEDY if facing is None else f"{facing}; else {_REMEDY}"
+    return f"the rig is probably wrong: {reasons}: {remedy}"
 
 
 def findings(

@@ -116,7 +116,7 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     with part_of_work(span=(0.95, 1.0)):
         up = how.alignment.up
         found = judge(plain, given, figure, rest.pose, target, alignment, met.solids, met.legs, up)
-    if not how.insists and (why := refusal(found)):
+    if not how.insists and (why := refusal(found, met.alike)):
         raise RigError(why)
     lines = [
         *doubts(found),

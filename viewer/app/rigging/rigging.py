@@ -13,6 +13,7 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import key_name
 from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.posed_alignment import FACING
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings, TemplateScale
 from viewer.autorig.correspondence import MAX_ANGLE
@@ -63,8 +64,6 @@ GHOSTS: dict[Literal[""] | GhostStyle, str] = {
 """Styles in which the template is drawn, with their labels."""
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
-FACING = "R004.facing"
-"""Key of the message that front and back look alike."""
 SHAPE = "shape"
 """Key of the template that is a skeleton found in the target's shape."""
 _USUAL, _FOUND = TransferSettings(), SkeletonSettings()

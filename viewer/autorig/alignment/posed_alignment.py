@@ -88,6 +88,8 @@ ALIKE = (
     "R004.facing: front and back look alike: facing {front} leaves a gap of {gap:.2f} % of the "
     "size, facing {back} {other:.2f} %: check the front; if it is {back}, {remedy}"
 )
+FACING = ALIKE.partition(":")[0]
+"""Key of this message."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +116,11 @@ class PosedAlignment:
     """The axis that the target faces, if only the surfaces decided that, and not clearly."""
     other: PosedAlignment | None = None
     """The fit that faces the other way, which is nearly as close."""
+
+    @property
+    def alike(self) -> Diagnostic | None:
+        """The message that the fit that faces the other way is nearly as close."""
+        return next((line for line in self.lines if line.key == FACING), None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
