@@ -36,8 +36,10 @@ from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.motion.animation_choice import animation_labels
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.evaluation import JointMotion, frames_between, frames_of, world_frames
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import TransformClip
+from viewer.rigs.retargeting.source_rest import with_source_rest
 from viewer.rigs.scalars import length_text
 from viewer.rigs.scene import Actor, Scene, time_span
 from viewer.rigs.shape import rest_joints, shaped
@@ -223,6 +225,9 @@ class Track:
     """Path of each foot in the scene."""
     body: float
     """Size of the body: twice the length of its longest leg, or its height, in scene units."""
+    stance: Figure
+    """The figure; a captured skeleton whose rest pose does not stand has the estimated one of
+    retargeting."""
 
     @property
     def n_frames(self) -> int:
@@ -292,7 +297,8 @@ def _track(subject: Subject) -> Track | None:
     frames = frames_of(figure, clip, times, actor.own_pose)
     scale = mean_scale(actor.placement)
     is_bound = figure.is_attached and not subject.lacks("bindings")
-    soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
+    stance = _stance(figure, clip)
+    soles = soles_of(shaped(stance, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
     heels = np.empty((count, len(feet), 3))
@@ -322,13 +328,22 @@ def _track(subject: Subject) -> Track | None:
         scales=frames.scales,
         per_frame=per_frame,
         stepped=_stepped(clip, skeleton, times),
-        size=scale * _size(subject, figure),
+        size=scale * _size(subject, stance),
         scale=scale,
         feet=feet,
         soles=lowest,
         paths=tuple(paths),
-        body=scale * body_size(figure),
+        body=scale * body_size(stance),
+        stance=stance,
     )
+
+
+def _stance(figure: Figure, clip: JointMotion) -> Figure:
+    """Return a figure whose rest pose shows where soles and heels are in the space of the feet."""
+    if figure.mesh is not None or clip.kind != "sampled":
+        return figure
+    # The bones of some captures rest along one axis, or in the axes of their parents.
+    return with_source_rest(SkeletonMotion(figure, clip), "auto")[0].figure
 
 
 def _stepped(clip: JointMotion, skeleton: Skeleton, times: Floats) -> Bools:

@@ -17,6 +17,7 @@ from viewer.rigs.feet.contacts import (
     foot_contacts,
     ground_velocity,
     half_window,
+    mean_speeds,
     on_moving_ground,
     slowest_points,
 )
@@ -24,10 +25,18 @@ from viewer.rigs.feet.ground import Ground, ground_under, resting_frames
 from viewer.rigs.feet.soles import extent
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import axis_vector
+from viewer.rigs.retargeting.joint_names import name_tokens
+from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import joint_labels
 
 # Keyframes are drawn by hand: feet that are shifted or roll below the ground are a matter of style.
-# What is reported as a warning there cannot be one: a body that skates, or stands in the ground.
+# What is reported as a warning there cannot be one: a body that skates, or stands in the ground. So
+# are frames that were baked from controls of inverse kinematics, which some BVH files have as
+# joints, or which hold the feet of a moving body exactly: standing feet of captures have a median
+# speed of 0.02 sizes per second.
+_CONTROLS = {"ik", "pole", "ctrl", "control"}
+_EXACT, _MOVES = 0.003, 0.03  # sizes per second: of a held foot at most, of the hip at least
+_HELD = 0.5  # minimum fraction of the rows in which a foot stands while the body moves
 _ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
 _WITH_BODY = 0.1  # maximum difference of the velocities of foot and body, relative to the foot's
 _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
@@ -49,23 +58,27 @@ def check(subject: Subject) -> Iterator[Finding]:
     feet = track.feet.tolist()
     if len(feet) < 2:
         return
-    height, heights = extent(figure)[1], track.soles
+    height, heights = extent(track.stance)[1], track.soles
     given = subject.options.ground
     ground, sinks = 0.0, limits.SINKS
     if isinstance(given, float | int):
         ground = float(given)
     else:
         step = float(track.times[1] - track.times[0])
-        found = ground_under(subject.actor, subject.up, heights, track.present, step)
+        stance = Actor(track.stance, placement=subject.actor.placement)
+        found = ground_under(stance, subject.up, heights, track.present, step)
         if found.height is None:
             yield _unsure(subject, found, step)
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
         yield from _sunk_throughout(subject, track, feet, ground, height)
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
-    yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height, height)
+    is_recorded = _is_recorded(subject, track)
+    yield from _sunk(
+        subject, track, feet, labels, heights - ground, sinks * height, height, is_recorded
+    )
     yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
-    yield from _slipped(subject, track, feet, labels, heights - ground, height)
+    yield from _slipped(subject, track, feet, labels, heights - ground, height, is_recorded)
 
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
@@ -74,6 +87,27 @@ def _moving(subject: Subject, figure: Figure) -> Track | None:
         return None
     track = track_of(subject)
     return track if track is not None and track.size > 0.0 and len(track.times) > 2 else None
+
+
+def _is_recorded(subject: Subject, track: Track) -> bool:
+    """Return whether a motion was captured, and its feet were not held by inverse kinematics."""
+    if subject.actor.captured is None or track.body <= 0.0:
+        return subject.actor.captured is not None
+    names = subject.actor.figure.require_skeleton().names
+    if sum(not _CONTROLS.isdisjoint(name_tokens(name)) for name in names) > 1:
+        return False
+    rate = 1.0 / float(track.times[1] - track.times[0])
+    how = runs_of(track.present), rate, track.body, axis_vector(subject.up)
+    n_rows = n_held = 0
+    for path, contacts in zip(track.paths, foot_contacts(track.paths, *how), strict=True):
+        points = (path.toe, path.heel)
+        slowest = np.min([mean_speeds(each, rate) for each in points], axis=0) / track.body
+        moves = mean_speeds(path.hip, rate) > _MOVES * track.body
+        for contact in contacts:
+            rows = slice(contact.start, contact.stop)
+            n_rows += int(moves[rows].sum())
+            n_held += int((moves[rows] & (slowest[rows] < _EXACT)).sum())
+    return n_held <= _HELD * n_rows
 
 
 def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
@@ -104,6 +138,7 @@ def _sunk(
     heights: Floats,
     limit: float,
     height: float,
+    is_recorded: bool,
 ) -> Iterator[Finding]:
     """Report feet that sink deeper than a limit in figure units."""
     depths = np.where(track.present[:, None], -heights, 0.0)
@@ -117,7 +152,7 @@ def _sunk(
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
     worst = int(depths[frames[0]].argmax())
     is_serious = (
-        subject.actor.captured is not None
+        is_recorded
         or bool(deepest[frames[0]] > _DEEP * height * track.scale)
         or _stands_sunk(track, depths, limit, height)
     )
@@ -155,7 +190,7 @@ def _sunk_throughout(
     # A modelled character stands at rest on the floor of its animations, or they have it at 0. A
     # capture may have any floor, and stand well below 0 if its root counts from the hip; a floor
     # a little below is a fault of its height.
-    figure = subject.actor.figure
+    figure = track.stance
     row = subject.actor.placement["xyz".index(subject.up)]
     sole = float(row["xyz".index(figure.up)] * extent(figure)[0] + row[3])
     size = track.scale * height
@@ -214,6 +249,7 @@ def _slipped(
     labels: list[str],
     heights: Floats,
     height: float,
+    is_recorded: bool,
 ) -> Iterator[Finding]:
     """Report a foot that slides along the ground, where feet do not stand."""
     if track.body <= 0.0:  # legs without a length
@@ -248,9 +284,7 @@ def _slipped(
         yield from travels
         return
     worst = int(distances.argmax())
-    is_carried = subject.actor.captured is not None or _is_carried(
-        track, worst, slides[:, worst], height
-    )
+    is_carried = is_recorded or _is_carried(track, worst, slides[:, worst], height)
     if not is_carried:
         yield from travels
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())

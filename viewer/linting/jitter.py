@@ -49,8 +49,14 @@ def check(subject: Subject) -> Iterator[Finding]:
     skeleton = subject.actor.figure.skeleton
     if track is None or skeleton is None or not track.size > 0.0:
         return
-    noise = noise_of(track.positions, track.present, _width(clip.timing.frame_rate))
-    limit = _LIMIT * track.size
+    width, limit = _width(clip.timing.frame_rate), _LIMIT * track.size
+    noise = noise_of(track.positions, track.present, width)
+    for joint in np.flatnonzero((noise > limit).any(axis=0)):
+        # Quick swings have fourth differences, too, but no white ones.
+        runs = _windows(noise[:, joint] > limit, track.present, width)
+        n_frames = sum(stop - first for first, stop in runs)
+        if n_frames < _FEWEST or _correlation(track.positions[:, joint], runs) > _WHITE:
+            noise[:, joint] = 0.0
     labels, scale = [*joint_labels(skeleton)], track.scale
 
     def shown(length: float) -> str:
@@ -115,6 +121,13 @@ def _correlation(values: Floats, runs: list[tuple[int, int]]) -> float:
     parts = [_fourth(values[first:stop]) for first, stop in runs if stop - first > 4]
     products = sum(float((part[1:] * part[:-1]).sum()) for part in parts)
     return products / max(sum(float((part * part).sum()) for part in parts), 1e-300)
+
+
+def _windows(is_noisy: Bools, present: Bools, width: int) -> list[tuple[int, int]]:
+    """Return the runs of frames that the windows around noisy ones are made of."""
+    half = width // 2 + 2
+    near = np.convolve(is_noisy, np.ones(2 * half + 1), mode="same") > 0.5
+    return runs_of(near & present)
 
 
 def _fourth(values: Floats) -> Floats:

@@ -11,6 +11,7 @@ from viewer.linting._subject import Indices, Subject, Track, track_of, travellin
 from viewer.phrases import counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
+from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.skeleton import Skeleton, joint_labels
 from viewer.rigs.skin import moves_vertices
 
@@ -80,7 +81,21 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
     if figure.skin is not None and figure.is_attached:
         moves = moves_vertices(figure.skin)
         bones &= moves & moves[above]
+    elif figure.mesh is None:
+        bones &= _of_body(skeleton)
     return bones
+
+
+def _of_body(skeleton: Skeleton) -> Bools:
+    """Return which joints have a known name, or one below them has: (J,); all, if none is known."""
+    # Without a skin, controls of inverse kinematics and slots for props look like bones.
+    known = np.array([bool(meaning) for meaning in joint_meanings(skeleton)])
+    if not known.any():
+        return ~known
+    for joint in range(skeleton.n_joints - 1, 0, -1):
+        if known[joint] and skeleton.parents[joint] >= 0:
+            known[skeleton.parents[joint]] = True
+    return known
 
 
 def _changed(
