@@ -1,5 +1,7 @@
 """Jumps of the root that are slower than the limit of all joints, and joints that keep turning."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linting.planted import limited_in_degrees
@@ -7,6 +9,8 @@ from linting.sound import column
 
 from viewer.linting import LintOptions, lint_scene
 from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.scene import Actor, Scene
 
 RATE = 60  # at which clips of curves are checked; their frames are counted at 30 per second
@@ -70,3 +74,38 @@ def test_wide_limits_are_those_of_a_wheel_if_the_motion_turns_it(turns, codes):
     clip = Clip("a", (turning,), 0.0, 10.0)
     found = lint_scene(Scene([Actor(limited_in_degrees(), clip=clip)]))
     assert [one.code for one in found if one.code == "S014"] == codes
+
+
+@pytest.mark.parametrize(
+    ("limits", "codes"),
+    [
+        ([(-100.0, 100.0)], []),
+        ([(-62.83, 62.83)], []),
+        ([(-90.0, 90.0)], ["S014"]),
+        ([(-100.0, 100.0), (-10.0, 140.0)], ["S014"]),
+    ],
+)
+def test_limits_of_whole_turns_or_100_radians_are_endless(limits, codes):
+    """The joint has these limits about x and y, and no motion."""
+    figure = column()
+    bounds = figure.skeleton.dof_limits.copy()
+    bounds[6 : 6 + len(limits)] = limits
+    wide = replace(figure, skeleton=replace(figure.skeleton, dof_limits=bounds))
+    found = lint_scene(Scene([Actor(wide)]))
+    assert [one.code for one in found if one.code == "S014"] == codes
+
+
+@pytest.mark.parametrize(("turned", "codes"), [(0.0, ["C003"]), (30.0, [])])
+def test_body_that_takes_another_held_pose_is_blocked(turned, codes):
+    """The root steps by 0.2 and 0.4 units after 1 and 2 s of 3 s; the joint above it may turn."""
+    figure = column()
+    count = 90
+    places = np.zeros((count, 2, 3))
+    places[:, 0, 0] = 0.2 * (np.arange(count) // 30)
+    half = np.radians(0.5 * turned) * (np.arange(count) // 30 % 2)
+    rotations = np.zeros((count, 2, 4))
+    rotations[..., 3] = 1.0
+    rotations[:, 1] = np.stack([np.sin(half), 0 * half, 0 * half, np.cos(half)], axis=1)
+    clip = SampledClip("a", Timing(30.0, np.arange(count)), rotations, places)
+    found = lint_scene(Scene([Actor(figure, clip=clip)]))
+    assert [one.code for one in found if one.code == "C003"] == codes

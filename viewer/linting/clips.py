@@ -20,7 +20,7 @@ from viewer.linting._subject import (
     travelling_joints,
 )
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.quaternion import angles_between
 from viewer.rigs.motion.clip import SHORTEST, Clip, evaluate_all
 from viewer.rigs.motion.timing import Timing
@@ -34,6 +34,10 @@ _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in betwee
 _STEP = 0.04  # minimum length, relative to the size: 70 mm for a person
 _STILL, _BESIDE = 0.1, 4  # maximum length of steps beside it, relative to it, and their number
 _POSES = 3  # minimum number of changes between held poses that are a motion
+# A body that is displaced keeps its pose; one that takes another pose between two that are held is
+# blocked, even where the rest of the motion is not.
+_OTHER_POSE = math.radians(2.0)  # smallest rotation of a joint that takes another pose
+_MANY = 0.25  # minimum fraction of these among the joints that ever rotate
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
@@ -157,6 +161,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
         leaps = _leaps(
             steps / np.diff(track.times[rows])[:, None], travelling_joints(track, skeleton)
         )
+        leaps[_poses(track, rows)] = 0.0
         speeds[:] = 0.0
         speeds[rows[1:]] = np.where(track.stepped[rows[1:]], 0.0, leaps)
         fast = _too_fast(track, speeds, limit)
@@ -190,6 +195,7 @@ def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     is_step = (steps > _STEP * track.size) & (largest_around(steps, around) < _STILL * steps)
     is_step &= known[:, None] & ~track.stepped[rows[1:]][:, carriers]
     is_step[:_BESIDE] = is_step[max(len(steps) - _BESIDE, 0) :] = False
+    is_step[_poses(track, rows)] = False
     frames, joints = np.nonzero(is_step)
     if len(frames) == 0:
         return
@@ -222,6 +228,19 @@ def _is_blocked(track: Track) -> bool:
     is_held = not (changes[1:] & changes[:-1]).any()
     # A body at rest that is displaced, and maybe returns, is not blocked.
     return is_held and int(changes.sum()) >= _POSES
+
+
+def _poses(track: Track, rows: Indices) -> Bools:
+    """Return which steps between rows lead from one held pose to another: (N - 1,)."""
+    moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2).max(axis=1)
+    angles = angles_between(track.rotations[rows[1:]], track.rotations[rows[:-1]])
+    changes = (moves > _ROUNDING * track.size) | (angles > _ROUNDING).any(axis=1)
+    around = [k for k in range(-_BESIDE, _BESIDE + 1) if k != 0]
+    is_held = largest_around(changes[:, None].astype(float), around)[:, 0] == 0.0
+    turned = angles > _OTHER_POSE
+    fractions = turned.sum(axis=1) / max(1, np.count_nonzero(turned.any(axis=0)))
+    result: Bools = is_held & (fractions >= _MANY)
+    return result
 
 
 def _leaps(speeds: Floats, carriers: Ints) -> Floats:

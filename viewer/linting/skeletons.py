@@ -11,6 +11,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import agree, counted, listed, quoted, rounded
+from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.inspection.faults import UNIT_ROTATION
 from viewer.rigs.pose import Pose
 from viewer.rigs.posing.dof_text import beyond_text
@@ -20,6 +21,8 @@ _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
 # Few joints rotate by more than two turns, and limits of more than two turns in degrees mean none.
 # Two turns in a file may be rounded up, as in 12.57.
 _TURNS = 12.6, 720.0
+_ENDLESS = 100.0
+_WHOLE = 0.005  # rounding of a whole number of turns
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -104,6 +107,14 @@ def _rest(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
         )
 
 
+def _are_endless(low: Floats, high: Floats) -> Bools:
+    """Return which limits (D,) are 100 radians or whole turns in both directions, as of wheels."""
+    turns = high / (2.0 * np.pi)
+    is_whole = (np.abs(turns - np.round(turns)) < _WHOLE) | (high == _ENDLESS)
+    result: Bools = (low == -high) & is_whole
+    return result
+
+
 def _spinning(subject: Subject) -> list[int]:
     """Return the DOFs that the motion rotates by more than two turns, as those of wheels."""
     clip = subject.actor.joint_motion
@@ -145,7 +156,7 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator
     sizes = np.where(rotates[:, None], np.abs(skeleton.dof_limits), 0.0)
     wide = ((sizes > _TURNS[0]) & (sizes <= _TURNS[1])).any(axis=1)
     degrees = np.setdiff1d(np.flatnonzero(wide), _spinning(subject))
-    if len(degrees):
+    if not _are_endless(low[degrees], high[degrees]).all():
         first = int(degrees[0])
         yield subject.found(
             "S014.limits: {n} limits of more than two turns, which look like degrees (first: "
