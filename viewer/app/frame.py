@@ -35,8 +35,7 @@ from viewer.app.posing.shape_panel import drop_unreadable_shapes
 from viewer.app.preferences.applying import follow_preferences
 from viewer.app.recording.recording import Preview, draw_record_dialog, start_recording
 from viewer.app.rigging.facing import FacingPictures
-from viewer.app.rigging.joint_editing.frames import update_joints
-from viewer.app.rigging.joint_editing.overlay import draw_joint_edits
+from viewer.app.rigging.joint_editing.drags import draw_joint_edits, update_joints
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight

@@ -223,7 +223,7 @@ def test_other_joints_are_fitted_to_those_placed_by_hand(drive, monkeypatch):
         kept.update({name: places[name] for name in held})
         return {"root": FAR, "middle": FAR + np.array([0.5, 0.25, 0.0]), "end": FAR}
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.section.fit_again", fitted)
     hand.click("Fit the other joints")
     hand.finish_job()
     assert set(kept) == {"root", "end"}
@@ -246,7 +246,7 @@ def test_fit_bends_an_arm_where_it_bent_and_moves_the_hand_along(drive, monkeypa
         places = [[-3.6, 0, 0], [1, 0.4, 0], [1.5, 0.1, 0], [3.5, -0.1, 0.1]]  # misses the wrist
         return dict(zip(arm, np.array(places) + FAR, strict=True))
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.section.fit_again", fitted)
     hand.click("Fit the other joints")
     hand.finish_job()
     shoulder, elbow, wrist, finger = joints(hand)
@@ -273,7 +273,7 @@ def test_fit_that_comes_too_late_changes_nothing_and_says_why(drive, monkeypatch
         assert gate.wait(60)
         return {"root": FAR, "end": FAR}
 
-    monkeypatch.setattr("viewer.app.rigging.joint_editing.template_fit.fit_again", fitted)
+    monkeypatch.setattr("viewer.app.rigging.joint_editing.section.fit_again", fitted)
     hand.click("Fit the other joints")
     leave(hand)
     left = figure(hand)

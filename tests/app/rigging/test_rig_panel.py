@@ -19,7 +19,7 @@ from viewer.app.core.view_frame import view_frame
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
 from viewer.app.rigging import work
-from viewer.app.rigging.joint_editing.starts import starts
+from viewer.app.rigging.joint_editing.section import starts
 from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.results import discard, trial_clip

@@ -10,8 +10,14 @@ import numpy as np
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
-from viewer.app.rigging.joint_editing.rest_meshes import keep_rest_mesh, rest_mesh
-from viewer.app.rigging.joint_editing.state import LONGEST, JointEditing, commit, edited
+from viewer.app.rigging.joint_editing.state import (
+    LONGEST,
+    JointEditing,
+    commit,
+    edited,
+    keep_rest_mesh,
+    rest_mesh,
+)
 from viewer.app.rigging.rigging import Rigging
 from viewer.app.rigging.work import begin_work
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings

@@ -9,14 +9,15 @@ from viewer.app.core.view_frame import view_frame
 from viewer.app.posing import posing
 from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.rigging.joint_editing.places import middle_under
-from viewer.app.rigging.joint_editing.rest_meshes import plane_of, rest_mesh
 from viewer.app.rigging.joint_editing.state import (
     LONGEST,
     JointEditing,
     commit,
     edited,
     label,
+    middle_under,
+    plane_of,
+    rest_mesh,
     symmetry,
     tried,
 )

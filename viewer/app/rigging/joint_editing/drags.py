@@ -1,4 +1,4 @@
-"""Drags of joints in the view."""
+"""Joints edited in the view: their drags, their drawing, and what each frame does for them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,24 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import Place, view_frame
-from viewer.app.posing.gizmo import joint_at
+from viewer.app.posing.gizmo import Pen, joint_at, text_box
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.move_tool import dragged
-from viewer.app.rigging.joint_editing.binding import stop_binding
-from viewer.app.rigging.joint_editing.places import figure_place, middle_under, scene_place
+from viewer.app.posing.posed_joint import posed_joint
+from viewer.app.posing.posing import Posing
+from viewer.app.rigging.joint_editing.binding import bind, stop_binding
+from viewer.app.rigging.joint_editing.commands import take_click
 from viewer.app.rigging.joint_editing.state import (
     JointDrag,
     JointEditing,
     edited,
+    figure_place,
     label,
+    middle_under,
     put_joints,
+    scene_place,
     show,
+    stop_editing,
     symmetry,
     tried,
 )
@@ -27,6 +33,7 @@ from viewer.phrases import capitalized
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.joint_edits import moved, partners, rest_worlds, with_below
+from viewer.rigs.pose import Pose, rest_pose
 from viewer.rigs.scene import Actor
 
 _STILL = 2.0  # maximum movement of the pointer during a click, window coordinates
@@ -142,3 +149,72 @@ def _show_dragged(state: AppState, actor: Actor, drag: JointDrag) -> None:
     places = dict(enumerate(rest_worlds(drag.figure)[:, :3, 3])) | drag.places
     put_joints(state, actor, moved(actor.figure, places), drag.held)
     drag.skeleton, drag.bound = actor.figure.require_skeleton(), drag.places
+
+
+_HOT, _BONE, _DOT = (1.0, 0.92, 0.55, 1.0), (0.45, 0.90, 0.95, 0.9), (1.0, 1.0, 1.0, 0.9)
+
+
+def draw_joint_edits(state: AppState) -> None:
+    """Draw the joints of the edited figure over the view, with the held ones where they will be."""
+    editing, actor = state.of(JointEditing), edited(state)
+    posed = None if actor is None or state.actor is not actor else posed_joint(actor, 0)
+    if actor is None or posed is None:
+        return
+    places, skeleton, drag = posed.world[:, :3, 3].copy(), posed.skeleton, editing.drag
+    if drag is not None:
+        for joint, place in drag.places.items():
+            places[joint] = apply_transform(posed.placement, place)
+    pen, io = Pen(view_frame(state)), imgui.get_io()
+    x, y, width, height = state.view_rect
+    pen.list.push_clip_rect((x, y), (x + width, y + height), True)
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            is_held = drag is not None and bool({joint, parent} & drag.places.keys())
+            pen.line(places[[parent, joint]], _HOT if is_held else _BONE, 1.5)
+    for place in places:
+        pen.dot(place, 4.0, (0.0, 0.0, 0.0, 0.6))
+        pen.dot(place, 3.0, _DOT)
+    if 0 <= state.selected_joint < len(places):
+        pen.dot(places[state.selected_joint], 6.5, _HOT, filled=False)
+    free = not io.want_capture_mouse and drag is None and imgui.is_mouse_pos_valid()
+    under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if free else -1
+    named = drag.joint if drag is not None else under
+    seen = pen.frame.place(places[named]) if named >= 0 else None
+    if seen is not None:
+        pen.dot(places[named], 7.5, _HOT, filled=False)
+        at = (seen[0] + 12.0 * pen.scale, seen[1] - 8.0 * pen.scale)
+        text_box(state, pen, at, [(label(actor.figure, named), _DOT)])
+    pen.list.pop_clip_rect()
+
+
+def update_joints(state: AppState) -> None:
+    """Take clicks, keep the edited figure at rest, and have it bound; called in each frame."""
+    editing = state.of(JointEditing)
+    if editing.scene is not state.scene:
+        choices = editing.choices
+        editing = state.put(JointEditing(scene=state.scene, choices=choices))
+    actor = editing.actor
+    if actor is None:
+        return
+    skeleton, pose = actor.figure.skeleton, actor.own_pose
+    is_there = any(actor is one for one in state.scene.actors)
+    if not is_there or skeleton is None or pose is None or not actor.figure.is_attached:
+        stop_editing(state)  # undone
+        return
+    if state.actor is actor and state.selected_joint >= skeleton.n_joints:
+        state.selected_joint = -1
+    poses = state.of(Posing).is_on or state.actor is not actor or _is_posed(actor, pose)
+    if editing.is_on and poses:
+        stop_editing(state)
+        state.say_status("Edit skeleton is off: it edits the chosen figure at rest")
+    if editing.is_on:
+        take_click(state, actor)
+    show_drag(state, actor)
+    bind(state, actor)
+
+
+def _is_posed(actor: Actor, pose: Pose) -> bool:
+    """Return whether an actor is not at rest, apart from its shape and place."""
+    rest = rest_pose(actor.figure.require_skeleton())
+    parts = ("dofs", "translations", "rotations", "scales")
+    return any(not np.array_equal(getattr(pose, part), getattr(rest, part)) for part in parts)
