@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-import numpy as np
-
 from viewer.diagnostics.record import JsonObject
 from viewer.errors import FormatError
 from viewer.phrases import counted, printable, rounded
+from viewer.rigs.arrays import runs_of
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.sampled_clip import SampledClip
@@ -83,9 +82,8 @@ def _describe_rows(clip: SampledClip | PointClip) -> JsonObject:
 
 def gaps_of(timing: Timing) -> list[list[int]]:
     """Return the first and last frame number of every gap."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], timing.present, [True]])))
-    pairs = edges.reshape(-1, 2) + np.array([timing.first_frame, timing.first_frame - 1])
-    return [[int(first), int(last)] for first, last in pairs]
+    gaps = runs_of(~timing.present)
+    return [[timing.first_frame + a, timing.first_frame + b - 1] for a, b in gaps]
 
 
 def describe_animations(actor: Actor) -> list[JsonObject]:

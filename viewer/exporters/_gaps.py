@@ -12,8 +12,7 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._options import GAPS, GapHandling
 from viewer.phrases import agree, listed
-from viewer.rigs.arrays import Bools, Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.geometry.quaternion import slerp
 from viewer.rigs.motion.evaluation import Frames
 

@@ -11,8 +11,8 @@ from viewer.errors import OutputError
 from viewer.exporters._exporter import Exporter, Part
 from viewer.exporters._options import ExportOptions
 from viewer.phrases import printable
+from viewer.rigs.arrays import runs_of
 from viewer.rigs.captures.person import person_name
-from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.scene import Actor
 
 PERSON = "{person}"

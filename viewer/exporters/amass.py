@@ -34,8 +34,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
-from viewer.rigs.arrays import Arrays
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Arrays, runs_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import SignedUp
 from viewer.rigs.motion.sampled_animation import SampledAnimation

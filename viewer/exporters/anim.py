@@ -18,8 +18,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.phrases import counted, optional
-from viewer.rigs.arrays import Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.motion.clip import Clip, Tangent, evaluate_all, is_course_rig

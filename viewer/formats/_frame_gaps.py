@@ -70,7 +70,7 @@ def _problem(source: Source) -> Diagnostic:
     return replace(source.frame_faults[0], path=None, line=None)
 
 
-def frame_spans(numbers: NDArray[np.integer]) -> list[Phrase]:
-    """Return phrases for the runs of consecutive frames in ascending numbers."""
-    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+def frame_spans(numbers: NDArray[np.integer], step: int = 1) -> list[Phrase]:
+    """Return phrases for the runs of frames in ascending numbers, ``step`` apart."""
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > step) + 1)
     return [frame_range(int(run[0]), int(run[-1])) for run in runs if len(run)]

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase, frame_range
+from viewer.diagnostics import Phrase
+from viewer.formats._frame_gaps import frame_spans
 from viewer.linting._finding import Finding
 from viewer.linting._subject import (
     Indices,
@@ -74,15 +75,15 @@ def missing_frames(subject: Subject, timing: Timing) -> Iterator[Finding]:
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
         return
-    runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
     first = timing.first_frame
+    spans = frame_spans(gaps + first)
     times = subject.times(timing, gaps)
     yield subject.found(
         "C005.gaps: {n} missing in {n_gaps}: {gaps}",
         n=counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1),
         all=int(there[-1] - there[0]) + 1,
-        n_gaps=counted(len(runs), "gap"),
-        gaps=listed([frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs]),
+        n_gaps=counted(len(spans), "gap"),
+        gaps=listed(spans),
         part="clip",
         frames=gaps + first,
         times=times,

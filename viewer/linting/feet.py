@@ -10,8 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, track_of, travelling_joints
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.contacts import (
     foot_contacts,

@@ -10,8 +10,7 @@ from viewer.diagnostics import frame_range
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, track_of
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.geometry.quaternion import angles_between
 
 # A body that holds a pose slows down before, and speeds up again, one joint after another. Frames

@@ -9,9 +9,8 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, track_of
 from viewer.phrases import counted, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.captures.points import PointClip, visible_size
-from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.skeleton import joint_labels
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms

@@ -12,11 +12,11 @@ from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import RigError
 from viewer.loading.settings import CleanUp
 from viewer.phrases import agree, counted, listed, optional, rounded
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints, runs_of
 from viewer.rigs.captures.person import person_label
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.cleanup.displacement import joint_displacement, point_displacement
-from viewer.rigs.cleanup.frames import Captured, resampled, runs_of, trimmed
+from viewer.rigs.cleanup.frames import Captured, resampled, trimmed
 from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
 from viewer.rigs.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
 from viewer.rigs.feet.ground import resting_height

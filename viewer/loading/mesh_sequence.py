@@ -22,12 +22,13 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, frame_range, note
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import FormatError
 from viewer.formats import Source, natural_key, read
 from viewer.formats._archive.checking import archive_of, corners_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._body_keys import rate_in
+from viewer.formats._frame_gaps import frame_spans
 from viewer.formats._polygons import triangulate
 from viewer.phrases import axes, counted, listed, printable, rounded
 from viewer.progress import report
@@ -218,12 +219,10 @@ def frame_numbers(paths: Sequence[Path]) -> tuple[Ints, list[Diagnostic]]:
     missing = np.setdiff1d(np.arange(numbers[0], numbers[-1] + 1, step), numbers)
     if not len(missing):
         return numbers, []
-    runs = np.split(missing, np.flatnonzero(np.diff(missing) > step) + 1)
-    spans = [frame_range(int(run[0]), int(run[-1])) for run in runs]
     return numbers, [
         note(
             "F007.frames-missing: {frames} of {first} to {last} {are} missing: interpolated",
-            frames=listed(spans),
+            frames=listed(frame_spans(missing, step)),
             first=int(numbers[0]),
             last=int(numbers[-1]),
             are="is" if len(missing) == 1 else "are",

@@ -27,6 +27,12 @@ def span(rows: NDArray[np.intp]) -> slice | NDArray[np.intp]:
     return slice(int(rows[0]), int(rows[-1]) + 1) if is_range else rows
 
 
+def runs_of(flags: Bools) -> list[tuple[int, int]]:
+    """Return the runs of True as half-open ranges: [F, T, T, F] has the one run (1, 3)."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 class Deferred:
     """An array in a file, read on first use and then cached.
 

@@ -13,7 +13,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.theme import faint
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.memo import Memo
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
@@ -133,8 +133,7 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     timing = clip.timing
     if timing is None:
         return [(clip.start, clip.end)]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], timing.present, [False]])))
-    first, stop = edges[::2], edges[1::2]
+    first, stop = np.array(runs_of(timing.present), dtype=np.int64).reshape(-1, 2).T
     starts = timing.start + first / timing.frame_rate
     ends = timing.start + (stop - 1) / timing.frame_rate
     split = np.flatnonzero(starts[1:] - ends[:-1] > max(shortest, 1.0 / timing.frame_rate) * 1.001)

@@ -24,8 +24,7 @@ from viewer.formats import all_or_none, save_parts
 from viewer.formats.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
-from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Floats, Ints, runs_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import up_rotation
 from viewer.rigs.geometry.vectors import axis_vector

@@ -39,10 +39,9 @@ from viewer.exporters.gltf.sampled import (
 )
 from viewer.formats import all_or_none, save_bytes
 from viewer.phrases import agree, all_of, counted, file_size, listed, optional, rounded
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.captures.cameras import CameraPath, CameraView
 from viewer.rigs.captures.carried_view import carrier_of, moving_alone, played_with, view_in
-from viewer.rigs.cleanup.frames import runs_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.file_record import Json
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, nearest_rotations

@@ -12,8 +12,7 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.geometry.quaternion import angles_between, slerp
 from viewer.rigs.motion.animation_choice import play_animation
 from viewer.rigs.motion.clip import Channel, Clip

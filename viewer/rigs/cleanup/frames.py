@@ -22,12 +22,6 @@ _ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, for times that are trea
 _MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per second
 
 
-def runs_of(flags: Bools) -> list[tuple[int, int]]:
-    """Return the runs of True as half-open ranges: [F, T, T, F] has the one run (1, 3)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 def in_frame_order(clip: _Clip) -> _Clip:
     """Return the same motion with one row for each present frame, in time order."""
     return _with_rows(clip, np.arange(clip.timing.n_frames))

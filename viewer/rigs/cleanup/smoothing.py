@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.cleanup.frames import Captured, in_frame_order, runs_of
+from viewer.rigs.arrays import Floats, Ints, runs_of
+from viewer.rigs.cleanup.frames import Captured, in_frame_order
 from viewer.rigs.geometry.quaternion import (
     align_signs,
     conjugate,

@@ -8,9 +8,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Ints
+from viewer.rigs.arrays import Ints, runs_of
 from viewer.rigs.captures.points import PointClip
-from viewer.rigs.cleanup.frames import Captured, points_between, runs_of
+from viewer.rigs.cleanup.frames import Captured, points_between
 from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rows
 
 Span = tuple[int, int]

@@ -20,8 +20,7 @@ import numpy as np
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Bools, Floats
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.feet.body import body_legs
 from viewer.rigs.feet.contacts import foot_contacts
 from viewer.rigs.feet.legs import legs_of

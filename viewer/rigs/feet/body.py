@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Floats, Ints, runs_of
 from viewer.rigs.feet.contacts import FootPath
 from viewer.rigs.feet.legs import Leg, legs_of, reach
 from viewer.rigs.feet.soles import Soles, extent, soles_of_feet

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Bools, Floats, Ints
-from viewer.rigs.cleanup.frames import runs_of
+from viewer.rigs.arrays import Bools, Floats, Ints, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.curves import falling
 
