@@ -11,7 +11,7 @@ from rigs.animated import animated_leg, wave
 
 from viewer.app.core.clock import MODES, Clock
 from viewer.app.files.files import Files, Stream, stream_captures
-from viewer.app.playback.tracks import bars, key_times, present_spans, ruler_text_place
+from viewer.app.playback.timeline_panel import bars, key_times, present_spans, ruler_text_place
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rigs.captures.capture import Capture, CapturePart
