@@ -13,7 +13,7 @@ from rigs.retargeting.trotting import animal
 from rigs.retargeting.two_people import figure_of
 
 from viewer.formats import Source, detect
-from viewer.formats.bvh.guess import guess_up
+from viewer.formats.bvh import guess_up
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
