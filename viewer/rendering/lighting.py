@@ -21,11 +21,11 @@ from viewer.rigs.geometry.vectors import Up
 
 if TYPE_CHECKING:
     from viewer.rendering.casters import Casters
-    from viewer.rendering.passes.occlusion_pass import OcclusionPass
     from viewer.rendering.passes.shadow_passes import (
         ContactPass,
         ContactShadows,
         GroundShadowPass,
+        OcclusionPass,
         ShadowPass,
     )
 
@@ -130,7 +130,7 @@ class Lighting:
         return self._shadow
 
     def _occlusion_pass(self, size: tuple[int, int]) -> OcclusionPass:
-        from viewer.rendering.passes.occlusion_pass import OcclusionPass
+        from viewer.rendering.passes.shadow_passes import OcclusionPass
 
         if self._occlusion is None or self._occlusion.size != size:
             if self._occlusion is not None:

@@ -1,13 +1,15 @@
-"""Shadows: the key light's shadow map, soft contact shadows, and both on the ground.
+"""Shadows: the key light's shadow map, soft contact shadows, both on the ground, and occlusion.
 
 Contact shadows need no light source: they represent the ambient light that figures block from the
-ground below them, as a blurred field of the heights of figures above the ground.
+ground below them, as a blurred field of the heights of figures above the ground. Ambient occlusion
+is that of surfaces by each other, in screen space, from the depths and normals of the image.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -17,9 +19,17 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.draw_state import behind, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.gpu.upload import buffer, checked
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, light_axes, set_model
+from viewer.rendering.view import (
+    FILTER_RADIUS,
+    SHADOW_UNIT,
+    Occlusion,
+    Shadow,
+    View,
+    light_axes,
+    set_model,
+)
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.geometry.vectors import cross, unit
@@ -42,6 +52,9 @@ _CONTACT_OPACITIES = 0.55, 0.38
 # Sine of the light's elevation at which its shadow appears and has full strength.
 GRAZING = 0.06, 0.22
 _FIELD_UNIT = 0
+
+# Ambient occlusion.
+_RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's size
 
 
 class ShadowPass:
@@ -291,3 +304,84 @@ def _parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
     # OpenGL's depth grows away from the eye, against the backward axis.
     projection = np.diag([1.0 / halves[0], 1.0 / halves[1], -1.0 / halves[2], 1.0])
     return View(translation_matrix(-middle) @ matrix, projection, Camera(orthographic=True))
+
+
+class OcclusionPass:
+    """Pass that computes how much ambient light reaches each pixel, at half resolution."""
+
+    def __init__(
+        self, context: moderngl.Context, programs: Programs, size: tuple[int, int]
+    ) -> None:
+        self.context, self.size = context, size
+        self._half = (size[0] + 1) // 2, (size[1] + 1) // 2
+        self._owner = Owner()
+        keep = self._owner.keep
+        with self._owner.guard():
+            what = f"ambient occlusion of {size[0]} x {size[1]} pixels"
+            self._geometry = keep(
+                checked(context, context.texture(self._half, 4, dtype="f4"), what)
+            )
+            depth = keep(context.depth_renderbuffer(self._half))
+            self._surfaces = keep(context.framebuffer([self._geometry], depth))
+            self._fields = [keep(context.texture(self._half, 2, dtype="f4")) for _ in range(2)]
+            for texture in (self._geometry, *self._fields):
+                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._targets = [keep(context.framebuffer([field])) for field in self._fields]
+            self._arrays = [
+                keep(context.vertex_array(programs.drawing("fullscreen", fragment=name), []))
+                for name in ("occlusion", "occlusion_blur")
+            ]
+
+    def draw(
+        self,
+        draw: Callable[[View, str], object],
+        view: View,
+        size: float,
+        phase: float,
+        strength: float,
+    ) -> Occlusion:
+        """Compute an image's occlusion, of a strength from 0 to 1, for figures of a scene size."""
+        # The size determines the radius; the phase of the direction pattern, 0 to 1, is different
+        # for each pass of an image.
+        halved = self._halved(view)
+        context = self.context
+        self._surfaces.use()
+        context.viewport = (0, 0, *self._half)
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "<"
+        self._surfaces.clear(depth=1.0)
+        draw(halved, "geometry")
+        context.enable_only(moderngl.NOTHING)
+        projection, is_parallel = halved.projection, view.camera.is_parallel
+        focal = np.array([projection[0, 0], projection[1, 1]])
+        middle = -projection[:2, 3] if is_parallel else projection[:2, 2]
+        scale, shift = 2.0 / (np.array(self._half) * focal), (middle - 1.0) / focal
+        search = {
+            "u_geometry": 0,
+            "u_unproject": (*scale.tolist(), *shift.tolist()),
+            "u_orthographic": is_parallel,
+            "u_radius": _RADIUS * size,
+            "u_pixels": 0.5 * self._half[1] * float(focal[1]),
+            "u_phase": phase,
+        }
+        self._run(0, self._geometry, search)
+        blur = {"u_occlusion": 0, "u_radius": 0.25 * _RADIUS * size}
+        self._run(1, self._fields[0], blur)
+        return Occlusion(self._fields[1], strength)
+
+    def _halved(self, view: View) -> View:
+        """Return the view of the half-resolution image, whose full size is rounded up to even."""
+        scale = np.array(self.size) / (2.0 * np.array(self._half))
+        matrix = np.diag([*scale, 1.0, 1.0])
+        matrix[:2, 3] = scale - 1.0
+        return replace(view, projection=matrix @ view.projection)
+
+    def _run(self, step: int, source: moderngl.Texture, values: Mapping[str, object]) -> None:
+        self._targets[step].use()
+        source.use(0)
+        set_uniforms(self._arrays[step].program, values)
+        self._arrays[step].render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free textures and framebuffers."""
+        self._owner.release()
