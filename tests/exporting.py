@@ -6,10 +6,9 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.exporters import ExportOptions, Part, Selection, export
-from viewer.rigs.captures.sampled_points import SampledPoints
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.animation_choice import own_animations
-from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.sampled_animation import SampledAnimation, SampledPoints
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.scene import Actor, Scene
 

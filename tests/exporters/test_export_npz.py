@@ -16,9 +16,8 @@ import viewer
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions, export
 from viewer.rigs.captures.points import PointLayout
-from viewer.rigs.captures.sampled_points import SampledPoints
 from viewer.rigs.figure import Figure
-from viewer.rigs.motion.sampled_animation import single_frame
+from viewer.rigs.motion.sampled_animation import SampledPoints, single_frame
 from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import ball_skeleton
 from viewer.rigs.skinning import Skinning

@@ -26,9 +26,9 @@ from viewer.data_classes import dataclass
 from viewer.formats import opened_text
 from viewer.phrases import printable
 from viewer.rigs.figure import Figure, figure_pose
-from viewer.rigs.motion.spring_motion import release_springs
 from viewer.rigs.pose import Pose, PoseKey, pose_of
 from viewer.rigs.scene import Actor
+from viewer.rigs.springs.simulation import release_springs
 
 _MOST_LISTED = 6
 _LONGEST = 40  # maximum length of a name in characters

@@ -65,10 +65,10 @@ from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.rigs.geometry.vectors import SignedUp
 from viewer.rigs.motion.animation_choice import has_own_animations, keeps_keys, own_animations
 from viewer.rigs.motion.sampled_animation import SampledAnimation, frame_range, upright_single_frame
-from viewer.rigs.motion.spring_motion import has_springs, with_baked_springs
 from viewer.rigs.motion.timing import frame_at
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skinning import Skinning
+from viewer.rigs.springs.simulation import has_springs, with_baked_springs
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 if TYPE_CHECKING:

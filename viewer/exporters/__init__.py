@@ -21,9 +21,8 @@ from viewer.phrases import all_of, counted, printable
 from viewer.plugins import plugin_of, plugins_of
 from viewer.rigs.bodies.smpl_family import member_of
 from viewer.rigs.captures.person import is_tracked, person_label
-from viewer.rigs.captures.sampled_points import sample_upright_points
 from viewer.rigs.figure import Figure
-from viewer.rigs.motion.sampled_animation import upright_animation
+from viewer.rigs.motion.sampled_animation import sample_upright_points, upright_animation
 from viewer.rigs.motion.upright import upright_actor, upright_placement
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skinning import Skinning

@@ -11,10 +11,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools
-from viewer.rigs.captures.sampled_points import SampledPoints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import SignedUp
-from viewer.rigs.motion.sampled_animation import SampledAnimation
+from viewer.rigs.motion.sampled_animation import SampledAnimation, SampledPoints
 from viewer.rigs.motion.transform_clip import TransformClip
 from viewer.rigs.scene import Actor, Scene
 

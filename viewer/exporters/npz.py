@@ -42,12 +42,11 @@ from viewer.formats._archive.values import Archive
 from viewer.phrases import all_of, counted, optional
 from viewer.rigs.arrays import Arrays, Bools, Deferred, Floats
 from viewer.rigs.captures.points import PointLayout
-from viewer.rigs.captures.sampled_points import SampledPoints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
 from viewer.rigs.motion.evaluation import pose_of, world_frames
-from viewer.rigs.motion.sampled_animation import SampledAnimation, rotated_frames
+from viewer.rigs.motion.sampled_animation import SampledAnimation, SampledPoints, rotated_frames
 from viewer.rigs.posing.pose_vector import write_vector
 from viewer.rigs.skinning import deform, joint_matrices
 

@@ -360,8 +360,8 @@ def _switch_on_springs(draft: SceneDraft, up: str) -> None:
     skeletons = [(actor, actor.figure.skeleton) for actor in draft.actors]
     if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
         return
-    from viewer.rigs.motion.spring_motion import springs_for
     from viewer.rigs.scene import pose_actors, time_span
+    from viewer.rigs.springs.simulation import springs_for
 
     start = time_span(draft.actors)[0]
     for actor in draft.actors:

@@ -25,12 +25,12 @@ from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, parameter_clip
 from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rate
-from viewer.rigs.motion.spring_motion import springs_for
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_map import JointMap
 from viewer.rigs.scene import Actor, pose_actors
+from viewer.rigs.springs.simulation import springs_for
 
 _COLORS = (
     (0.85, 0.42, 0.28),

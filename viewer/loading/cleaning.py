@@ -16,9 +16,15 @@ from viewer.rigs.arrays import Floats, Ints, runs_of
 from viewer.rigs.captures.person import person_label
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.cleanup.displacement import joint_displacement, point_displacement
-from viewer.rigs.cleanup.frames import Captured, resampled, trimmed
+from viewer.rigs.cleanup.frames import (
+    Captured,
+    common_frames,
+    interpolate_gaps,
+    joined_tracks,
+    resampled,
+    trimmed,
+)
 from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
-from viewer.rigs.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
 from viewer.rigs.feet.ground import resting_height
 from viewer.rigs.feet.legs import legs_of
 from viewer.rigs.feet.planting import lock_feet

@@ -12,10 +12,9 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import did_you_mean, name_hint
 from viewer.rendering.camera import Camera, camera_axes, fit
-from viewer.rendering.recorder import Follow, Recording, copied, pose_scene
+from viewer.rendering.recorder import Follow, Recording, copied, followed_point, pose_scene
 from viewer.rigs.arrays import Floats
 from viewer.rigs.mesh import bounding_box
-from viewer.rigs.motion.follow import followed_point
 from viewer.rigs.scene import Actor, Scene, scene_points
 
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # maximum numbers of frames and points for fitting

@@ -34,8 +34,9 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
 from viewer.rigs.arrays import Bytes, Floats
-from viewer.rigs.motion.follow import followed_point
-from viewer.rigs.scene import Scene, pose_actors, scene_box
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_box
+from viewer.rigs.skinning import joint_matrices
 
 _WAITING = 1  # number of frames that may wait for a worker, limited to save memory
 _PATIENCE = 0.05  # seconds between steps while the sink finishes
@@ -297,3 +298,19 @@ class _Cameras:
         elif recording.shifts is not None:
             camera.target = camera.target + recording.shifts[frame]
         return camera
+
+
+def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
+    """Return a joint's scene position (3,), or all joints' or points' mean; None while absent."""
+    if not actor.is_present:
+        return None
+    if actor.points is not None:
+        seen = actor.points[:, 3] > 0.0
+        chosen = seen & (np.arange(len(seen)) == joint) if joint >= 0 else seen
+        points = actor.points[chosen, :3]
+    elif actor.own_pose is not None and actor.figure.skeleton is not None:
+        joints = joint_matrices(actor.figure, actor.own_pose)[:, :3, 3]
+        points = joints[[joint]] if 0 <= joint < len(joints) else joints
+    else:
+        return None
+    return apply_transform(actor.placement, points).mean(axis=0) if len(points) else None

@@ -23,8 +23,8 @@ from viewer.app.curves.editing import (
     set_playback_range,
 )
 from viewer.app.playback.timeline_panel import set_rate
+from viewer.rendering.framing import followed_point
 from viewer.rigs.motion.clip import evaluate
-from viewer.rigs.motion.follow import followed_point
 from viewer.rigs.scene import Actor, Scene
 
 KEY = (ARM_X, 1)  # at 1 s: 0.6

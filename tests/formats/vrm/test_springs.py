@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings, load
-from viewer.rigs.motion.spring_motion import release_springs, with_baked_springs
 from viewer.rigs.scene import Actor, pose_actors
+from viewer.rigs.springs.simulation import release_springs, with_baked_springs
 from viewer.rigs.springs.spring_joints import Springs
 
 ON = MotionSettings(springs=True)

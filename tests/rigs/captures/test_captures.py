@@ -25,10 +25,10 @@ from viewer.rigs.captures.keypoint_layouts import (
     matching_joints,
 )
 from viewer.rigs.captures.points import PointClip, PointLayout
-from viewer.rigs.captures.sampled_points import sample_upright_points
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import axis_rotations
 from viewer.rigs.geometry.transform import rotation_transform
+from viewer.rigs.motion.sampled_animation import sample_upright_points
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import ball_skeleton

@@ -9,15 +9,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.errors import RigError
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.cleanup.displacement import joint_displacement, point_displacement
-from viewer.rigs.cleanup.frames import resampled, trimmed
-from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
-from viewer.rigs.cleanup.tracks import (
+from viewer.rigs.cleanup.frames import (
     Gaps,
     common_frames,
     inner_gaps,
     interpolate_gaps,
     joined_tracks,
+    resampled,
+    trimmed,
 )
+from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rigs.motion.sampled_clip import SampledClip

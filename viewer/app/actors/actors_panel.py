@@ -28,9 +28,9 @@ from viewer.app.retargeting.drive_changes import (
 from viewer.phrases import printable
 from viewer.rigs.captures.keypoint_layouts import fitted_body, keypoint_distances
 from viewer.rigs.mesh import box_size
-from viewer.rigs.motion.spring_motion import has_springs, release_springs, springs_for
 from viewer.rigs.scalars import length_unit
 from viewer.rigs.scene import Actor
+from viewer.rigs.springs.simulation import has_springs, release_springs, springs_for
 
 _PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
 _LONGEST_WINDOW = 1e4  # maximum extent of a motion path, seconds

@@ -6,8 +6,8 @@ from viewer.app.core.camera_moves import follow_calibrated
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
+from viewer.rendering.recorder import followed_point
 from viewer.rigs.arrays import Floats
-from viewer.rigs.motion.follow import followed_point
 
 
 @dataclass(slots=True)

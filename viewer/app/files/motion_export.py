@@ -46,10 +46,10 @@ from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.progress import part_of_work, report
 from viewer.rigs.bodies.smpl_family import member_of
 from viewer.rigs.motion.animation_choice import has_own_animations, keeps_keys, own_animations
-from viewer.rigs.motion.spring_motion import release_springs
 from viewer.rigs.motion.timing import frame_at
 from viewer.rigs.pose import pose_key
 from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.springs.simulation import release_springs
 
 N_ROWS = 6.5
 """Height of the list in lines: half a line shows that the list continues."""

@@ -1,4 +1,4 @@
-"""Sampled animations: an actor's poses at a fixed rate, for export; keys baked to frames."""
+"""Motions at a fixed rate, for export: poses or captured points of actors; keys baked to frames."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
-from viewer.rigs.geometry.vectors import HANGING, SignedUp
+from viewer.rigs.geometry.vectors import HANGING, SignedUp, Up
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.clip_edit import clip_from_pose
 from viewer.rigs.motion.evaluation import (
@@ -207,3 +208,54 @@ def upright_single_frame(
         return single_frame(actor, rate, number, time), HANGING[up] if hangs else up
     standing = replace(upright_actor(scene, actor), figure=actor.figure)
     return single_frame(standing, rate, number, time), up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledPoints:
+    """Captured points at a fixed rate."""
+
+    name: str
+    """Name of the actor."""
+    layout: PointLayout
+    """Names and limbs of the K points."""
+    frame_rate: float
+    """Frames per second."""
+    first_frame: int
+    """Number of the first frame."""
+    times: Floats
+    """(F,). Seconds."""
+    present: Bools
+    """(F,) bool. Whether the person is present."""
+    points: Floats
+    """(F, K, 3). In the unit of the capture; NaN where a point is not visible."""
+    confidences: Floats
+    """(F, K). 0 where a point is not visible."""
+
+
+def sample_upright_points(
+    scene: Scene,
+    actor: Actor,
+    rate: float | None = None,
+    frames: tuple[int, int | None] | None = None,
+    interpolate: bool = False,
+) -> tuple[SampledPoints, Up]:
+    """Return an actor's sampled points, rotated upright if upside down, and their up axis."""
+    motion, layout = actor.clip, actor.figure.points
+    if motion is None or motion.points is None or layout is None:
+        raise RigError(f"{actor.name} has no motion of points")
+    own = motion.timing.frame_rate
+    rate = own if rate is None else rate
+    first, stop = frame_range(motion, rate, frames)
+    times: Floats = motion.start + np.arange(first, stop) / rate
+    found = motion.sample(None, times, interpolate)
+    assert found.points is not None  # it is a motion of points
+    rows = np.where(found.present[:, None, None], found.points, 0.0)
+    up, hangs = own_up(scene, actor)
+    places, confidences = rows[..., :3], rows[..., 3]
+    if hangs:
+        places = places * np.array([1.0, -1.0, -1.0])
+    places = np.where(confidences[..., None] > 0.0, places, np.nan)
+    start = first + (motion.timing.first_frame if rate == own else 0)
+    return SampledPoints(
+        actor.name, layout, rate, start, times, found.present, places, confidences
+    ), up
