@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Deferred, Floats, Ints, freeze_fields, frozen, runs_of
+from viewer.rigs.arrays import Bools, Deferred, Floats, Ints, freeze_fields, frozen, runs_of
 from viewer.rigs.bodies.offsets import DeferredOffsets, SparseOffsets
 from viewer.rigs.bodies.pose_features import Feature
 from viewer.rigs.expressions import ExpressionRules, MaterialBinds
@@ -239,7 +239,7 @@ class Correctives:
 
 def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
     """Return ranges of rows whose weights are not all 0, split so that products stay small."""
-    active = weights.reshape(-1, block).any(axis=1)
+    active: Bools = weights.reshape(-1, block).any(axis=1)
     return [
         slice(start, min(start + _LONGEST, stop * block))
         for first, stop in runs_of(active)
