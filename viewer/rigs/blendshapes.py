@@ -239,7 +239,7 @@ class Correctives:
 
 def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
     """Return ranges of rows whose weights are not all 0, split so that products stay small."""
-    active: Bools = weights.reshape(-1, block).any(axis=1)
+    active: Bools = np.asarray(weights.reshape(-1, block).any(axis=1))
     return [
         slice(start, min(start + _LONGEST, stop * block))
         for first, stop in runs_of(active)

@@ -20,15 +20,12 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     visible_rows,
 )
-from viewer.app.curves.data import Curve, channel_of, curves_of
+from viewer.app.curves.data import Curve, curves_of
 from viewer.app.curves.editing import (
     Curves,
-    DofKeys,
-    TransformKeys,
     add_key_at,
     ask_for_clip,
     can_have_keys,
-    change_slope,
     change_tangent,
     delete_chosen,
     drop_missing,
@@ -42,7 +39,7 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.files.files import offer_files
-from viewer.rigs.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, slopes
+from viewer.rigs.motion.clip import EXTRAPOLATIONS, TANGENT_RULES
 from viewer.rigs.motion.transform_clip import INTERPOLATIONS
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
@@ -106,19 +103,15 @@ def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tup
     """Return the curves of a selected joint; for keyed transforms, its angles that have keys."""
     rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
     keyed = keyed_of(state.actor)
-    if not isinstance(keyed, TransformKeys):
-        return rows
-    moving = tuple(row for row in rows if keyed.channel(row) is not None)
-    return tuple(row for row in moving if curves[row].is_angle) or moving or rows
+    return rows if keyed is None else keyed.shown_first(curves, rows)
 
 
 def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
-    """Return the joint whose curves are shown first; for keyed transforms, the first with keys."""
+    """Return the joint whose curves are shown first: the first with keys, if there are any."""
     keyed, numbers = keyed_of(state.actor), [curve.number for curve in curves]
-    if isinstance(keyed, TransformKeys):
-        moving = (n for row, n in enumerate(numbers) if keyed.channel(row) is not None)
-        return next(moving, numbers[0])
-    return numbers[0]
+    if keyed is None:
+        return numbers[0]
+    return next((n for row, n in enumerate(numbers) if keyed.keys(row) is not None), numbers[0])
 
 
 # The list
@@ -224,18 +217,17 @@ def _button_beside(state: AppState, text: str, tooltip: str) -> bool:
 def _draw_modes(state: AppState) -> None:
     """Draw the choices for whole channels: interpolation of transforms, extrapolation of DOFs."""
     rows, keyed = focused_rows(state.of(Curves)), keyed_of(state.actor)
-    moving = keyed.channel(rows[0]) if rows and isinstance(keyed, TransformKeys) else None
-    if moving is not None:
-        between = choice(state, "Interpolation", moving.interpolation, _INTERPOLATIONS)
+    if keyed is None or not rows:
+        return
+    interpolation = keyed.interpolation(rows[0])
+    if interpolation is not None:
+        between = choice(state, "Interpolation", interpolation, _INTERPOLATIONS)
         explain("between the keys of the curves with selected keys, otherwise of all shown curves")
         for each in INTERPOLATIONS:
-            if between == each != moving.interpolation:
+            if between == each != interpolation:
                 interpolate(state, each)
-    channel = channel_of(keyed.clip, rows[0]) if rows and isinstance(keyed, DofKeys) else None
-    if channel is None:
-        return
-    for side, text in enumerate(("Before", "After")):
-        now = channel.extrapolation[side]
+    for side, now in enumerate(keyed.extrapolation(rows[0]) or ()):
+        text = ("Before", "After")[side]
         new = choice(state, text, now, _MODES)
         explain("extrapolation of the curves with selected keys, otherwise of all shown curves")
         for mode in EXTRAPOLATIONS:
@@ -268,16 +260,17 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
         value = _field(state, "Value", factor * float(keys[1][key]))
         if value is not None:
             place_key(state, place, value=value / factor)
-    channel = channel_of(keyed.clip, row) if isinstance(keyed, DofKeys) else None
-    if channel is not None:
+    tangents, known = keyed.tangents(row), keyed.slopes(row)
+    if tangents is not None:
         for side, text in enumerate(_SIDES):
             # Draw the choice of the tangent rule on one side.
-            tangent = channel.tangents[place[1]][side]
+            tangent = tangents[key][side]
             now = tangent if isinstance(tangent, str) else "number"
             new = choice(state, text, now, _TANGENTS)
             if new == "number" != now:
                 # The slope computed by the rule keeps the curve unchanged.
-                change_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
+                present = 0.0 if known is None else float(known[key, side])
+                change_tangent(state, [place], side, present)
             for rule in TANGENT_RULES:
                 if new == rule != now:
                     change_tangent(state, state.of(Curves).keys, side, rule)
@@ -285,14 +278,14 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     # Explicit tangents have fields for their slopes, per second.
     own: Sequence[float | None] = ()
-    if channel is not None:
-        own = [None if isinstance(rule, str) else rule for rule in channel.tangents[key]]
-    elif (known := keyed.slopes(row)) is not None:
+    if tangents is not None:
+        own = [None if isinstance(rule, str) else rule for rule in tangents[key]]
+    elif known is not None:
         own = known[key].tolist()
     for side, slope in enumerate(own):
         typed = None if slope is None else _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
-            change_slope(state, [place], side, typed / factor)
+            change_tangent(state, [place], side, typed / factor)
 
 
 def _field(state: AppState, label: str, value: float) -> float | None:

@@ -6,7 +6,7 @@ the Curves panel edits: keys of DOFs, or of transforms.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from viewer.app.core.state import AppState
-from viewer.app.curves.data import channel_of, keyed_values
+from viewer.app.curves.data import Curve, channel_of, keyed_values
 from viewer.app.files.files import ask_where_to_write
 from viewer.app.files.saving import save_files
 from viewer.data_classes import dataclass
@@ -96,6 +96,23 @@ class DofKeys:
         channel = channel_of(self.clip, row)
         return None if channel is None or len(channel.times) < 2 else slopes(channel)
 
+    def tangents(self, row: int) -> Sequence[tuple[Tangent, Tangent]] | None:
+        """Return the tangents before and after each key of a curve."""
+        channel = channel_of(self.clip, row)
+        return None if channel is None else channel.tangents
+
+    def extrapolation(self, row: int) -> tuple[Extrapolation, Extrapolation] | None:
+        """Return the extrapolation before and after the keys of a curve."""
+        channel = channel_of(self.clip, row)
+        return None if channel is None else channel.extrapolation
+
+    def interpolation(self, row: int) -> None:
+        """Return None: tangents of keys determine the interpolation."""
+
+    def shown_first(self, curves: Sequence[Curve], rows: tuple[int, ...]) -> tuple[int, ...]:
+        """Return those of some curves that are shown before one is chosen: all."""
+        return rows
+
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
         """Return the values of some curves at many times: (T, C); those without keys are 0."""
         return keyed_values(self.clip, rows, times)
@@ -130,16 +147,20 @@ class DofKeys:
             clip = with_channel(clip, row, partial(delete_keys, keys=keys))
         return clip
 
-    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Clip:
-        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
-        return self.with_tangent(places, side, slope)
-
     def with_tangent(self, places: Iterable[KeyPlace], side: int, to: Tangent) -> Clip:
-        """Set the tangent rule or slope on one side of keys."""
+        """Set the tangent rule or slope on one side of keys: 0 incoming, 1 outgoing."""
         clip = self.clip
         for row, key in places:
             clip = with_channel(clip, row, partial(set_tangent, key=key, side=side, tangent=to))
         return clip
+
+    def extrapolated(self, rows: Iterable[int], side: int, mode: Extrapolation) -> Clip:
+        """Set the extrapolation of some curves before (0) or after (1) their keys."""
+        return self._changed(rows, partial(set_extrapolation, side=side, mode=mode))
+
+    def interpolated(self, rows: Iterable[int], mode: Interpolation) -> Clip:
+        """Return the same clip; see ``interpolation``."""
+        return self.clip
 
     def ranged(self, start: float, end: float) -> Clip:
         """Set the playback range, seconds."""
@@ -186,6 +207,22 @@ class TransformKeys:
             return None
         return channel.tangents[:, :, self.row(row).component]
 
+    def tangents(self, row: int) -> None:
+        """Return None: keys have slopes, but no rules."""
+
+    def extrapolation(self, row: int) -> None:
+        """Return None: the first and the last key are held."""
+
+    def interpolation(self, row: int) -> Interpolation | None:
+        """Return the interpolation between the keys of a curve."""
+        channel = self.channel(row)
+        return None if channel is None else channel.interpolation
+
+    def shown_first(self, curves: Sequence[Curve], rows: tuple[int, ...]) -> tuple[int, ...]:
+        """Return those of some curves that are shown before one is chosen: angles with keys."""
+        moving = tuple(row for row in rows if self.channel(row) is not None)
+        return tuple(row for row in moving if curves[row].is_angle) or moving or rows
+
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
         """Return the values of some curves at many times: (T, C)."""
         return row_values(self.clip, self.skeleton, rows, times)
@@ -218,12 +255,18 @@ class TransformKeys:
         """Delete keys, including all components that share them."""
         return delete_transform_keys(self.clip, self.skeleton, places)
 
-    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> TransformClip:
+    def with_tangent(self, places: Iterable[KeyPlace], side: int, to: Tangent) -> TransformClip:
         """Set the slope on one side of cubic keys."""
         clip = self.clip
+        if isinstance(to, str):
+            return clip  # there are no rules
         for row, key in places:
-            clip = set_transform_slope(clip, self.row(row), key, side, slope)
+            clip = set_transform_slope(clip, self.row(row), key, side, to)
         return clip
+
+    def extrapolated(self, rows: Iterable[int], side: int, mode: Extrapolation) -> TransformClip:
+        """Return the same clip; see ``extrapolation``."""
+        return self.clip
 
     def interpolated(self, rows: Iterable[int], mode: Interpolation) -> TransformClip:
         """Set the interpolation of the channels of some curves."""
@@ -310,34 +353,24 @@ def delete_chosen(state: AppState) -> None:
     curves.keys = frozenset()
 
 
-def change_slope(state: AppState, places: Iterable[KeyPlace], side: int, to: float) -> None:
-    """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
+def change_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
+    """Set the tangent rule or slope on one side of keys: 0 incoming, 1 outgoing."""
     keyed = keyed_of(state.actor)
     if keyed is not None:
-        state.actor.clip = keyed.sloped(places, side, to)
-
-
-def change_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
-    """Set the tangent rule or slope on one side of the keys of DOFs."""
-    keyed = keyed_of(state.actor)
-    if isinstance(keyed, DofKeys):
         state.actor.clip = keyed.with_tangent(places, side, to)
 
 
 def extrapolate(state: AppState, side: int, mode: Extrapolation) -> None:
     """Set the extrapolation of the curves in focus before (0) or after (1) their keys."""
     keyed = keyed_of(state.actor)
-    if isinstance(keyed, DofKeys):
-        clip = keyed.clip
-        for row in focused_rows(state.of(Curves)):
-            clip = with_channel(clip, row, partial(set_extrapolation, side=side, mode=mode))
-        state.actor.clip = clip
+    if keyed is not None:
+        state.actor.clip = keyed.extrapolated(focused_rows(state.of(Curves)), side, mode)
 
 
 def interpolate(state: AppState, mode: Interpolation) -> None:
     """Set the interpolation of the channels of the curves in focus."""
     keyed = keyed_of(state.actor)
-    if isinstance(keyed, TransformKeys):
+    if keyed is not None:
         state.actor.clip = keyed.interpolated(focused_rows(state.of(Curves)), mode)
 
 

@@ -20,7 +20,7 @@ from viewer.app.curves.editing import (
     KeyedMotion,
     KeyPlace,
     add_key_at,
-    change_slope,
+    change_tangent,
     delete_chosen,
     keyed_of,
     move_chosen,
@@ -414,7 +414,7 @@ def _draw_handle(
         # The knob stays at least a pixel away from the key on its side, so no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
-            change_slope(plot.state, [place], each, (y - value) / run / factor)
+            change_tangent(plot.state, [place], each, (y - value) / run / factor)
     return bool(hovered or held)
 
 
