@@ -10,6 +10,8 @@ from rigs.retargeting.standing_motions import KNEELING, RATE, jump, kneel, tread
 from rigs.retargeting.test_planted_feet import EXACT, OTHER, TOES, person
 from rigs.retargeting.two_people import places
 from rigs.retargeting.walking import stands, walk
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
@@ -76,6 +78,41 @@ def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(figure, motion)
             for moving, tail in (((figure, clip), "_"), ((source.figure, source.clip), ""))
         ]
         assert knees[0] <= 1.2 * knees[1]
+
+
+def denser(rotations: Floats, path: Floats, count: int) -> tuple[Floats, Floats]:
+    """Return a motion with ``count`` frames for each one, on smooth curves through its frames."""
+    frames = np.arange(len(path))
+    between = np.linspace(0.0, frames[-1], frames[-1] * count + 1)
+    found = np.empty((len(between), *rotations.shape[1:]))
+    for joint in range(rotations.shape[1]):
+        curve = RotationSpline(frames, Rotation.from_matrix(rotations[:, joint]))
+        found[:, joint] = curve(between).as_matrix()
+    return found, CubicSpline(frames, path)(between)
+
+
+@pytest.mark.parametrize("figure", [OTHER, SHORT], ids=["long", "short"])
+def test_knees_are_as_calm_at_240_frames_per_second(figure):
+    source = written(t_pose(), *denser(*kneel(), 4), rate=4.0 * RATE)
+    clip, changes = plant_feet(retarget(source, figure), figure)
+    assert changes.is_better and changes.after < changes.source
+    for side in ("Left", "Right"):
+        mine, theirs = (
+            np.abs(np.diff(knee_angles(places(*moving), side, tail), 2)).max()
+            for moving, tail in (((figure, clip), "_"), ((source.figure, source.clip), ""))
+        )
+        assert mine <= 1.2 * theirs
+
+
+def test_feet_swing_as_high_at_240_frames_per_second():
+    heights = []
+    for count in (1, 4):
+        source = written(t_pose(), *denser(*walk(), count), rate=count * RATE)
+        clip, _ = plant_feet(retarget(source, SHORT), SHORT)
+        where = places(SHORT, clip)
+        heights.append([where[f"{side}Foot_"][::count, 1] for side in ("Left", "Right")])
+    # 5 mm: contacts begin and end at other times, as there are more frames.
+    assert_allclose(heights[1], heights[0], atol=0.5)
 
 
 def test_jump_leaves_the_ground_and_lands_on_it():

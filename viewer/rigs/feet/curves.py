@@ -48,3 +48,12 @@ def falling(x: Floats) -> Floats:
     """Return a smooth step from 1 at 0 to 0 at 1 and beyond, with slope 0 at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return 1.0 - x * x * (3.0 - 2.0 * x)
+
+
+def envelope(values: Floats, half: int) -> Floats:
+    """Return a curve (N,) that is nowhere below the values (N,), smooth over ``half`` rows."""
+    # The moving average of moving maxima is never below the values themselves.
+    width = 2 * half + 1
+    padded = np.pad(values, width - 1, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
+    return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.feet.curves import envelope
 from viewer.rigs.geometry.quaternion import between, conjugate, multiply
 from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.geometry.vectors import unit
@@ -168,11 +169,7 @@ def lowering(
         needed = np.maximum(needed, np.where(is_far, -height - depth, 0.0))
     if not needed.any():
         return needed
-    width = 2 * max(1, round(_EASE * rate)) + 1
-    padded = np.pad(needed, width - 1, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
-    # The moving average of moving maxima is never below the values themselves.
-    return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)
+    return envelope(needed, max(1, round(_EASE * rate)))
 
 
 # Legs of animals, found from the shape of the skeleton: chains of joints down to the ground.

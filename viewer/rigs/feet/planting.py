@@ -32,7 +32,7 @@ from viewer.rigs.feet.contacts import (
     on_moving_ground,
     step_height,
 )
-from viewer.rigs.feet.curves import falling, smooth_curves
+from viewer.rigs.feet.curves import envelope, falling, smooth_curves
 from viewer.rigs.feet.legs import Leg, leg_rotations, legs_of, lowering, unscaled
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import (
@@ -109,6 +109,12 @@ _GAP = 0.0007
 # three 0.05 %, seven 0.015 % (0.3 mm). A stronger pull needs fewer, but makes a kink where the foot
 # would have touched the ground: the knee ratio of kneeling is 1.3 at 0.25 and 1.9 at 4.
 _LIFTS, _LIFTED = 7, 0.25
+
+# Rows per second above which the pull of a row on a lifted foot no longer grows with the stiffness:
+# with twice as many rows, each at the same weight, the foot is pulled as it was. If it grew, a kick
+# of CMU at 120 rows per second would be 100 mm lower than at 30, because the curve leaves the floor
+# with the slope that it has there.
+_DENSE = 60.0
 
 # Half the window of the two moving averages of the feet's shifts, seconds. 0.075 or 0.3 changes
 # knee ratios by at most 7 %.
@@ -367,7 +373,11 @@ class _FootPlan:
         # must not slide on the ground instead: it is lifted as well. Its limit follows a curve of
         # 0.06 s, as the knee would follow a sudden one: the knee ratio of kneeling would be 1.3
         # instead of 1.2. A curve of 0.15 s allows the foot to slide.
-        is_alone = 1.0 - np.delete(self.holds(), foot, axis=1).max(axis=1, initial=0.0)
+        # Near a contact of its own, the limit is that of the ground: one above a foot that is still
+        # held, or held in the next row, would throw it up between two rows.
+        holds, half = self.holds(), max(1, round(_LEVELS * self.rate))
+        is_alone = 1.0 - np.delete(holds, foot, axis=1).max(axis=1, initial=0.0)
+        is_alone *= 1.0 - envelope(holds[:, foot], half)
         raised = (is_alone * np.clip(-sunk, 0.0, limits.CLEARS * self.size))[:, None]
         smooth = _smoothed(self, raised, np.ones(len(raised)), _LEVELS)
         return lowest + np.clip(smooth, 0.0, raised)[:, 0]
@@ -629,7 +639,7 @@ def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 
     # half as much (0.015 instead of 0.03 % of the body), but knees of kneeling move more suddenly
     # (a knee ratio of 1.26 instead of 1.01). The neighbours rise with the row, and the foot passes
     # just above the ground, without a kink where it would have touched.
-    result, lifted = [], 1.0 + _LIFTED * (_EASE * plan.rate) ** 4
+    result, lifted = [], 1.0 + _LIFTED * (_EASE * min(plan.rate, _DENSE)) ** 4
     for foot, wanted in enumerate(every):
         row = count + foot
         stands, held = wanted.holds[:, None] >= 1.0, targets[row, :, :1]
