@@ -214,7 +214,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
             2,
             [
                 (
-                    "F007.bvh-time",
+                    "C017.bvh-time",
                     None,
                     {"seconds": 0.0, "low": 1e-06, "high": 1000000.0, "rate": 30.0},
                 )

@@ -181,6 +181,13 @@ def test_rates_and_milliseconds_in_place_of_a_frame_time_are_understood(time, ra
     ]
 
 
+@pytest.mark.parametrize(("time", "keys"), [("0.0005", []), ("0.00001", ["C017.bvh-fast"])])
+def test_frame_times_of_no_camera_are_reported_and_kept(time, keys):
+    motion, warnings = read(GOOD.replace("0.0333333", time))
+    assert motion.clip.timing.frame_rate == pytest.approx(1.0 / float(time))
+    assert [key for key, *_ in warnings] == keys
+
+
 @pytest.mark.parametrize("time", ["1", "2.5", "10.000000000"])
 def test_slow_frame_times_are_seconds(time):
     motion, warnings = read(GOOD.replace("0.0333333", time))

@@ -239,6 +239,7 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
+_FASTEST = 2000.0  # frames per second of the fastest cameras of motion capture
 _LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
 _DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
@@ -260,7 +261,7 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     if seconds == 0.0 or not is_rate(1.0 / seconds):
         low, high = 1.0 / FASTEST, 1.0 / SLOWEST
         source.warn(
-            "F007.bvh-time: Frame Time: expected {low:g} to {high:,.0f} seconds, found "
+            "C017.bvh-time: Frame Time: expected {low:g} to {high:,.0f} seconds, found "
             "{seconds:g}; {rate:g} fps assumed",
             seconds=seconds,
             low=low,
@@ -286,7 +287,16 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
             remedy=Remedy("Frames per second in the Timeline", "--fps"),
         )
         return rate
-    return _nearest_rate(frame_time, 1.0 / seconds)
+    rate = _nearest_rate(frame_time, 1.0 / seconds)
+    if rate > _FASTEST:
+        source.warn(
+            "C017.bvh-fast: Frame Time: {found} seconds are {rate:,.0f} fps, more than cameras of "
+            "motion capture have ({remedy} overrides it)",
+            found=bare(frame_time),
+            rate=rate,
+            remedy=Remedy("Frames per second in the Timeline", "--fps"),
+        )
+    return rate
 
 
 def _nearest_rate(frame_time: bytes, exact: float) -> float:
