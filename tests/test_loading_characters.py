@@ -288,6 +288,9 @@ def test_skeleton_with_animations_drives_a_character_opened_with_it(hero, tmp_pa
     bare.write_bytes(file.glb())
     (found,) = load(bare, hero).actors
     assert found.figure.name == "hero" and found.clip is not None
+    assert found.drive.source_rest == "auto"
+    with pytest.raises(RigError, match=r"bare\.glb: --source-rest: expected a frame from 0 to"):
+        load(bare, hero, motion=MotionSettings(source_rest=999))
     beside = load(bare, hero, motion=MotionSettings(drives=False)).actors
     assert [actor.figure.name for actor in beside] == ["bare", "hero"]
     assert beside[1].clip is None

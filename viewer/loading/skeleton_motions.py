@@ -68,9 +68,7 @@ def give_skeleton_motion(
             note=note,
             remedy=Remedy("Up axis in Preferences", "--up"),
         )
-    fault = rest_fault(motion, settings.source_rest)
-    if fault is not None:
-        raise RigError(replace(fault, path=path))
+    _check_rest(path, motion, settings)
     placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     drive = Drive(
         motion,
@@ -101,6 +99,13 @@ def give_skeleton_motion(
     actor = Actor(figure, clip=motion.clip, placement=placement, called=called)
     draft.add(actor, figure.up, placed=False)
     return Lone(path, motion, actor)
+
+
+def _check_rest(path: Path, motion: SkeletonMotion, settings: MotionSettings) -> None:
+    """Refuse a requested rest pose that a motion does not have."""
+    fault = rest_fault(motion, settings.source_rest)
+    if fault is not None:
+        raise RigError(replace(fault, path=path))
 
 
 def as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
@@ -267,13 +272,15 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
             motion = _motion_of(figure, wanted)
         except RigError:
             continue  # reported when the animations are started
+        path = actor.file or Path(figure.name)
+        _check_rest(path, motion, settings)
         drive = Drive(
             motion,
-            joint_map=settings.joint_map,
+            settings.source_rest,
+            settings.joint_map,
             plants_feet=settings.feet,
             keeps_hands=settings.hand_contact,
         )
-        path = actor.file or Path(figure.name)
         if drive_somebody(path, drive, draft, np.eye(4), others)[0]:
             draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))
             found = True

@@ -162,6 +162,61 @@ spine = pelvis
  thigh.R = right_hip
   thigh.R.001 = -
 """
+GERMAN = """
+Becken = pelvis
+ Wirbelsäule1 = spine1
+  Wirbelsäule2 = spine2
+   Brust = spine3
+    Hals = neck
+     Kopf = head
+    Schulter.links = left_collar
+     Oberarm.links = left_shoulder
+      Unterarm.links = left_elbow
+       Hand.links = left_wrist
+        Daumen1.links = left_thumb1
+        Zeigefinger1.links = left_index1
+    Schulter.rechts = right_collar
+     Oberarm.rechts = right_shoulder
+ Oberschenkel.links = left_hip
+  Unterschenkel.links = left_knee
+   Fuß.links = left_ankle
+    Zehen.links = left_foot
+ Oberschenkel.rechts = right_hip
+"""
+JAPANESE = """
+腰 = pelvis
+ 背骨 = spine1
+  胸 = spine3
+   首 = neck
+    頭 = head
+   左鎖骨 = left_collar
+    左上腕 = left_shoulder
+     左前腕 = left_elbow
+      左手 = left_wrist
+ 左太もも = left_hip
+  左すね = left_knee
+   左足 = left_ankle
+    左つま先 = left_foot
+ 右太もも = right_hip
+"""
+PAWS = """
+Hips = pelvis
+ Spine = spine1
+  Neck = neck
+   Head = head
+  LeftArm = left_shoulder
+   LeftForeArm = left_elbow
+    LeftForeArmTwist = -
+    LeftPaw = left_wrist
+     LeftClaw = -
+ LeftUpLeg = left_hip
+  LeftLeg = left_knee
+   LeftHindPaw = left_ankle
+    LeftHindClaw = left_foot
+ RightUpLeg = right_hip
+  RightLeg = right_knee
+   RightLegTwist = -
+"""
 MAYA_SMPL = """
 m_avg_root = -
  m_avg_Pelvis = pelvis
@@ -975,6 +1030,11 @@ TABLES = {
     "unreal with joints": changed(UNREAL, lambda name: re.sub("_([lr])$", r"_JNT_\1", name)),
     "quick rig": changed(MIXAMO, lambda name: f"QuickRigCharacter1_{name.split(':')[1]}"),
     "wrist and hand": WRIST_AND_HAND,
+    "german": GERMAN,
+    "german in ascii": changed(GERMAN, lambda name: name.replace("ß", "ss").replace("ä", "ae")
+                               .replace("links", "L").replace("rechts", "R")),
+    "japanese": JAPANESE,
+    "paws": PAWS,
     "mixamo in one word": changed(MIXAMO, lambda name: name.replace(":", "")),
     "mixamo behind a path": changed(MIXAMO, lambda name: f"Armature|{name}"),
     "mixamo with a suffix": changed(MIXAMO, lambda name: f"{name.split(':')[1]}_jnt"),

@@ -21,14 +21,18 @@ from viewer.rigs.retargeting.driven_feet import plant_feet
 from viewer.rigs.retargeting.joint_map import JointMap
 from viewer.rigs.retargeting.retarget import retarget
 from viewer.rigs.shape import rest_joints
+from viewer.rigs.skeleton import ball_skeleton
 
 SIDES = ("Left", "Right")
 PLATEAU = 8  # frames at either end of a stance in which the foot lands or rolls off
 EXACT = 1e-9  # cm
 
 
-def person(thigh: float, shin: float, foot: float, hips: float) -> Figure:
-    """Return a person whose thighs, shins, feet and hips are scaled by factors."""
+def person(thigh: float, shin: float, foot: float, hips: float, lift: float = 0.0) -> Figure:
+    """Return a person whose thighs, shins, feet and hips are scaled by factors.
+
+    ``lift``: added to the height of all joints but the toes.
+    """
     table = {name: (parent, np.array(place, float)) for name, (parent, place) in PERSON.items()}
     old = {name: place.copy() for name, (_, place) in table.items()}
 
@@ -42,6 +46,8 @@ def person(thigh: float, shin: float, foot: float, hips: float) -> Figure:
         bone(f"{side}Leg", f"{side}UpLeg", thigh)
         bone(f"{side}Foot", f"{side}Leg", shin)
         bone(f"{side}ToeBase", f"{side}Foot", foot)
+    for name, (_, place) in table.items():
+        place += 0.0 if name.endswith("ToeBase") else np.array([0.0, lift, 0.0])
     # The hierarchies differ, so joints are matched by meaning.
     names = {name: f"{name}_" for name in table}
     return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
@@ -168,6 +174,34 @@ def test_figure_with_the_proportions_of_the_source_is_unchanged():
     twin = figure_of({f"{n}_": (p and f"{p}_", q) for n, (p, q) in PERSON.items()}, "same")
     found, clip, changes = planted(twin)
     assert changes is None and clip is found.clip
+
+
+def test_figure_with_high_ankles_stands_on_the_ground_of_a_source_without_toes():
+    # The ankles of the source are 8 cm above the ground, those of the figure 22 cm more.
+    figure = person(1.15, 0.85, 1.0, 1.4, lift=22.0)
+    rotations, path = walk()
+    full = written(t_pose(), rotations, path, rate=RATE)
+    skeleton = full.figure.skeleton
+    kept = [j for j, name in enumerate(skeleton.names) if not name.endswith("ToeBase")]
+    names = tuple(skeleton.names[joint] for joint in kept)
+    parents_of = [kept.index(p) if p >= 0 else -1 for p in skeleton.parents[kept]]
+    places_of = rest_joints(full.figure)[kept]
+    bare = ball_skeleton(names, np.array(parents_of, dtype=np.int32), places_of)
+    motion = replace(
+        full,
+        figure=replace(full.figure, skeleton=bare),
+        clip=replace(
+            full.clip,
+            rotations=full.clip.rotations[:, kept],
+            translations=full.clip.translations[:, kept],
+        ),
+    )
+    clip, changes = plant_feet(retarget(motion, figure), figure)
+    assert changes.is_better
+    for side in SIDES:
+        balls = places(figure, clip)[f"{side}ToeBase_"][stands(side), 1]
+        # Without a mesh, the balls are the lowest points of the soles.
+        assert_allclose(balls.min(), 0.0, atol=EXACT)
 
 
 def test_feet_are_unchanged_if_the_source_never_stands():

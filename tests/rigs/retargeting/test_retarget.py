@@ -22,6 +22,7 @@ from viewer.errors import RigError
 from viewer.rigs.figure import Figure
 from viewer.rigs.humanoid import HUMAN_BONES, Humanoid
 from viewer.rigs.mesh import Mesh
+from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.motion.timing import Timing
@@ -123,6 +124,40 @@ def test_trunk_and_feet_keep_their_rest_shape():
         np.testing.assert_allclose(
             np.abs(clip.rotations[0, joint, 3]), 1.0, atol=EXACT, err_msg=name
         )
+
+
+def test_feet_without_toes_stay_level_whatever_the_knees_at_rest():
+    # The source stands with straight legs, 20 degrees apart, and has no toes; the figure with
+    # parallel legs, whose knees are 10 cm ahead. Both stand on level soles.
+    legs = {}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        hip = np.array([sign * 10.0, 95.0, 0.0])
+        down = np.array([sign * np.sin(np.radians(20.0)), -np.cos(np.radians(20.0)), 0.0])
+        legs[f"{side}Leg"] = (f"{side}UpLeg", hip + 45.0 * down)
+        legs[f"{side}Foot"] = (f"{side}Leg", hip + 90.0 * down)
+    source = figure_of({name: place for name, place in {**HIK, **legs}.items()
+                        if not name.endswith("ToeBase")}, "source")  # fmt: skip
+    bent = {}
+    for side, x in (("Left", 10), ("Right", -10)):
+        bent[f"{side}Leg"] = (f"{side}UpLeg", (x, 50, 10))
+        bent[f"{side}Foot"] = (f"{side}Leg", (x, 8, 0))
+    toes = {"RightToeBase": ("RightFoot", (-10, 1, 12))}
+    figure = figure_of(renamed({**HIK, **bent, **toes}, Hips="pelvis"), "figure")
+    # The source swings its legs down by 20 degrees, and its feet with them.
+    motion = moving(source, count=2, angle=0.0)
+    rotations = motion.clip.rotations.copy()
+    names = source.skeleton.names
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        swing = [0.0, 0.0, -sign * np.sin(np.radians(10.0)), np.cos(np.radians(10.0))]
+        rotations[1, names.index(f"{side}UpLeg")] = swing
+    motion = replace(motion, clip=replace(motion.clip, rotations=rotations))
+    clip = retarget(motion, figure).clip
+    worlds = world_frames(figure, frames_of(figure, clip, np.arange(2) / clip.timing.frame_rate))
+    own = figure.skeleton.names
+    for side in ("Left", "Right"):
+        foot = worlds[1, own.index(f"{side}Foot"), :3, :3]
+        # Parallel legs: the foot points as at rest, although the shin does not.
+        np.testing.assert_allclose(foot @ [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], atol=1e-9)
 
 
 def test_eyes_and_jaw_do_not_tilt_the_head():
@@ -498,6 +533,10 @@ def test_limbs_without_a_recognised_joint_of_the_motion_are_a_warning():
     )
     pairs = {"Knie_l": "left_knee", "Knie_r": "right_knee"}
     assert limb_warnings(moving(figure_of(foreign, "walk")), body, pairs) == []
+    # Feet that stay at rest cannot stand.
+    footless = {name: at for name, at in HIK.items() if not name.endswith(("Foot", "ToeBase"))}
+    (found,) = limb_warnings(moving(figure_of(footless, "walk")), body)
+    assert found.values["names"] == ["left_ankle", "right_ankle"]
 
 
 def test_limbs_without_a_recognised_joint_of_the_figure_are_a_warning():

@@ -27,6 +27,8 @@ from viewer.rigs.scalars import length_text
 
 _ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
 _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
+# Percentage of the heights of two feet that are lower where a foot stands: lower ones are noise.
+_STANDING = 5.0
 _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
@@ -115,7 +117,7 @@ def _source_paths(
     rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
     rest = rest_worlds(skeleton, chains, rests)
     world = chain_worlds(clip, chains, *rests)
-    axes, result = found.scale * found.to_target, []
+    axes, result, ankles = found.scale * found.to_target, list[FootPath](), list[Floats]()
     for pair, own in zip(pairs, vectors, strict=True):
         ends = (pair.hip, pair.ankle, pair.toe)
         hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
@@ -130,11 +132,19 @@ def _source_paths(
         linear = rest[ankle, :3, :3]
         if not (0.0 < height < _STEEP * length and is_solvable(linear)):
             result.append(FootPath(place + own[0], place + own[1], above))
+            ankles.append(place @ up)
             continue
         upward = np.linalg.solve(linear, found.to_target.T @ up)
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
         result.append(FootPath(ball, heel @ axes.T, above))
-    return result
+    if len(ankles) < len(pairs):
+        return result
+    # The figure's feet may be higher than the source's: soles below a ground at height 0, above
+    # which the ankles are, stand on it.
+    low = float(np.percentile([path.lowest(up) for path in result], _STANDING))
+    if not low < 0.0 < np.percentile(ankles, _STANDING):
+        return result
+    return [FootPath(path.toe - low * up, path.heel - low * up, path.hip) for path in result]
 
 
 def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:

@@ -64,19 +64,23 @@ _FAMILIES = {
     "MMD in English": ("shoulder arm elbow wrist -", "leg knee ankle toe"),
     "MMD in Latin letters": ("kata ude hiji tekubi -", "ashi hiza ashikubi tsumasaki"),
     "MMD": ("肩 腕 ひじ/ヒジ/肘 手首 -", "足 ひざ/ヒザ/膝 足首 つま先/足先ex"),
+    "Japanese": ("鎖骨 上腕 前腕 手 -", "太もも/太腿/大腿 すね/脛/下腿 足 つま先"),
+    "German": (
+        "schlüsselbein/schluesselbein/schulter oberarm unterarm hand -",
+        "oberschenkel unterschenkel fuß/fuss zehen/zehe"),
 }  # fmt: skip
 # Joints that a limb has even if it lacks others: a shoulder is no collar without an upper arm.
 _NEEDED = ("shoulder", "wrist", "hip", "ankle")
 
 # Words with the same meaning in all families.
 _TRUNK = {
-    "pelvis": "pelvis hips hip spinebase lowertorso lowerbody kahanshin 下半身",
+    "pelvis": "pelvis hips hip spinebase lowertorso lowerbody becken hüfte huefte kahanshin 下半身",
     "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper ab chest chestlower "
     "chestupper upperchest torso uppertorso thorax waist spinemid spineshoulder spinechest "
-    "spinenavel upperbody jouhanshin 上半身",
-    "neck": "neck lowerneck upperneck necklower neckupper necktwist kubi 首",
-    "head": "head atama 頭",
-    "jaw": "jaw あご",
+    "spinenavel upperbody wirbelsäule wirbelsaeule bauch brust jouhanshin 上半身 背骨 胸",
+    "neck": "neck lowerneck upperneck necklower neckupper necktwist hals kubi 首",
+    "head": "head kopf atama 頭",
+    "jaw": "jaw kiefer あご",
 }
 _CENTRE = {word: part for part, words in _TRUNK.items() for word in words.split()}
 _EYES = {"eye", "eyesmplhf", "eyeball", "adjfaceeye", "目"}
@@ -86,6 +90,7 @@ _CHAINS = ("spine", "neck")
 _FINGERS = {
     **{name: name for name in ("thumb", "index", "middle", "ring", "pinky")},
     **{"mid": "middle", "little": "pinky", "fore": "index", "third": "ring"},
+    **{"daumen": "thumb", "zeige": "index", "mittel": "middle", "kleiner": "pinky"},
     **{"oyayubi": "thumb", "hitosasiyubi": "index", "hitosashiyubi": "index"},
     **{"nakayubi": "middle", "kusuriyubi": "ring", "koyubi": "pinky"},
     **{"親指": "thumb", "人指": "index", "人差指": "index", "人差し指": "index"},
@@ -100,15 +105,18 @@ _ROKOKO_FINGER = re.compile(rf"finger([1-5])({'|'.join(_PHALANX)})")
 _BIPED_FINGER = re.compile(r"finger([0-4])([12]?)")
 
 _SIDES = {
-    **dict.fromkeys(("l", "left", "lft", "lt", "hidari", "左"), "left"),
-    **dict.fromkeys(("r", "right", "rgt", "rt", "migi", "右"), "right"),
+    **dict.fromkeys(("l", "left", "lft", "lt", "links", "hidari", "左"), "left"),
+    **dict.fromkeys(("r", "right", "rgt", "rt", "rechts", "migi", "右"), "right"),
 }
-_PAIRS = (("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi"))
+_PAIRS = (("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("links", "rechts"),
+          ("hidari", "migi"))  # fmt: skip
 _OTHER_SIDES = dict([*_PAIRS, ("左", "右"), *((b, a) for a, b in _PAIRS), ("右", "左")])
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 _FILLERS = {"jnt", "jt", "bn"}  # words for "joint", removed wherever they are
 _HELPERS = ("__", "ORG-")  # prefixes of joints that repeat another one's name
+# Words of joints that are no part of a limb, although they are below it.
+_ASIDE = {"twist", "roll", "end", "nub", "tip", "site", "ik", "pole", "target", "prop", "weapon"}
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[左右](?=\w)|[^\W\d_A-Za-z]+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
 _FEW = 8  # number of joints below which numbers at the end are part of the names
@@ -206,7 +214,8 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     """Return each joint's name in the SMPL family, unique, or "" without an equivalent.
 
     Spine joints are numbered from the pelvis; of more than three, the first, middle and last count.
-    Without a pelvis, the joint above both legs is it.
+    Without a pelvis, the joint above both legs is it;
+    a hand or foot with an unknown name is the joint below the elbow or knee.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
@@ -247,11 +256,36 @@ def _canonical_names(names: tuple[str, ...], links: tuple[int, ...]) -> tuple[st
         above = path_to_root(parents, result.index("pelvis"))
         spine = [joint for joint in spine if joint not in above]
     spine = _without_neck(spine, chains["neck"], result, parents)
+    _place_ends(names, result, parents)
     for joint, name in zip(*_numbered(spine), strict=True):
         result[joint] = name
     if chains["neck"]:
         result[chains["neck"][0]] = "neck"
     return tuple(result)
+
+
+def _place_ends(names: Sequence[str], result: list[str], parents: Ints) -> None:
+    """Name a hand or foot that is called otherwise, such as a paw, by its place, in place."""
+    for upper, middle, end in LIMBS:
+        if upper not in result or middle not in result or end in result:
+            continue
+        joint = _next_in_limb(names, result, parents, result.index(middle))
+        if joint < 0:
+            continue
+        result[joint] = end
+        toes = end.replace("_ankle", "_foot")
+        below = _next_in_limb(names, result, parents, joint) if toes != end else -1
+        if below >= 0 and toes not in result:
+            result[below] = toes
+
+
+def _next_in_limb(names: Sequence[str], result: list[str], parents: Ints, joint: int) -> int:
+    """Return the only joint below another that may continue its limb; -1 if none or several do."""
+    below = np.flatnonzero(parents == joint).tolist()
+    found = [each for each in below if not _ASIDE & set(name_tokens(names[each]))]
+    inner = [each for each in found if (parents == each).any()]
+    found = inner or found
+    return found[0] if len(found) == 1 and not result[found[0]] else -1
 
 
 def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:

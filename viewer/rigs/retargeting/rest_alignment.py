@@ -43,6 +43,9 @@ _SHORT = 1e-6
 # decides what the bones leave open; see ``_at_joint`` for what it changes otherwise.
 _SLIGHT = 1e-6
 
+# Cosine of the bend of a knee up to which a leg points down as a whole.
+_UNFOLDED = np.cos(np.radians(60.0))
+
 # Sine of the angle below which two directions are parallel and define no plane.
 _PARALLEL = 1e-6
 
@@ -116,6 +119,8 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
             children = [child for child, is_spine in zip(children, spine, strict=True) if is_spine]
         long = np.minimum(np.linalg.norm(mine, axis=1), np.linalg.norm(theirs, axis=1)) > short
         chosen = [child for child, is_long in zip(children, long, strict=True) if is_long]
+        if not chosen and matches.names[joint].endswith("_ankle"):
+            reference = _with_leg(source, target, matches, int(joint), whole_body, reference)
         result[joint] = _at_joint(
             matches, int(joint), chosen, (mine[long], theirs[long]), whole_body, reference
         )
@@ -172,6 +177,38 @@ def _at_joint(
     # (10, 5 and 0 degrees), the twist reaches 7 degrees, from the hand 3.
     start = reference if part.startswith(_FINGERS) else whole_body
     return shortest_arc(start @ mine[0], theirs[0]) @ start
+
+
+def _with_leg(
+    source: RestPose,
+    target: RestPose,
+    matches: Matches,
+    ankle: int,
+    whole_body: Floats,
+    reference: Floats,
+) -> Floats:
+    """Return the rotation of a foot without toes: that of its leg as a whole, from hip to ankle.
+
+    ``reference`` if a leg is folded, or its joints are not matched.
+    """
+    # Where legs stand apart at rest, so do the feet. But knees are bent at rest in one skeleton and
+    # not in the other, with the feet level in both: the shin is no reference for the foot.
+    side = matches.names[ankle].removesuffix("ankle")
+    upper = [side + part for part in ("hip", "knee")]
+    if not set(upper) <= set(matches.names):
+        return reference
+    joints = [*(matches.names.index(name) for name in upper), ankle]
+    partners = matches.partners[joints]
+    if (partners < 0).any():
+        return reference
+    lines = []
+    for points in (target.points[joints], source.points[partners]):
+        thigh, shin = np.diff(points, axis=0)
+        if not thigh @ shin > _UNFOLDED * np.linalg.norm(thigh) * np.linalg.norm(shin):
+            return reference
+        lines.append(thigh + shin)
+    mine, theirs = (line / np.linalg.norm(line) for line in lines)
+    return shortest_arc(whole_body @ mine, theirs) @ whole_body
 
 
 def _bones(

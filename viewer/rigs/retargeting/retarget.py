@@ -442,7 +442,9 @@ def _limbs_at_rest(
     unmatched, unknown = [], []
     for limb, side in product(_LIMBS, _SIDES):
         has_limb = any(f"{side}_{part}" in places for part in limb)
-        for name in (f"{side}_{part}" for part in limb[:2]):
+        # Hands may stay at rest; feet that do not follow cannot stand.
+        parts = limb if limb == _LIMBS[0] else limb[:2]
+        for name in (f"{side}_{part}" for part in parts):
             if name in places and matches.partners[places[name]] < 0:
                 unmatched.append(mine[places[name]])
             elif name not in places and name in meanings and has_limb:
