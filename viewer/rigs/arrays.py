@@ -21,7 +21,7 @@ Arrays = dict[str, NDArray[np.generic]]
 """Arrays of any types by name, to be written to an archive."""
 
 
-def span(rows: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+def span(rows: NDArray[Item]) -> slice | NDArray[Item]:
     """Return rows as a slice if they are consecutive: indexing with it copies nothing."""
     is_range = len(rows) and bool((np.diff(rows) == 1).all())
     return slice(int(rows[0]), int(rows[-1]) + 1) if is_range else rows

@@ -18,8 +18,8 @@ from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.bindings import Bindings
 from viewer.formats._scene_graph.content import NodeFile, Primitive
 from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.geometry.vectors import moved_tangents
-from viewer.rigs.mesh import Mesh, PartView, triangle_areas, vertex_normals
+from viewer.rigs.geometry.vectors import moved_tangents, unit
+from viewer.rigs.mesh import Mesh, PartView, area_vectors, vertex_normals
 from viewer.rigs.skin import Skin
 
 _NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
@@ -154,10 +154,7 @@ def flat_shaded(positions: Floats, triangles: Ints) -> _Shading:
     if len(triangles) > _MOST_TRIANGLES:
         sources = np.arange(len(positions), dtype=np.int32)
         return sources, triangles, vertex_normals(positions, triangles), False
-    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
-    doubled = 2.0 * triangle_areas(positions, triangles)
-    normals /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
+    normals = unit(area_vectors(positions, triangles))
     cells = np.rint(normals * _CELLS).astype(np.int64) + _CELLS
     side = 2 * _CELLS + 1
     # Faces with normals in the same of side^3 cells count as coplanar. A vertex and the cell of a

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Bools, Floats, Ints, runs_of
+from viewer.rigs.arrays import Ints, runs_of
 from viewer.rigs.captures.points import PointClip
 from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rows
-from viewer.rigs.motion.timing import Timing
 
 Captured = SampledClip | PointClip
 """A clip of sampled frames, of joints or of points."""
@@ -68,39 +67,11 @@ def resampled(clip: Captured, rate: float) -> Captured:
             f"{rate:g} fps: choose a lower rate or trim the motion"
         )
     times = timing.start + np.arange(count if timing.n_frames else 0) / rate
-    present = _present(timing, times)
+    present = timing.surrounds(times)
     rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
     again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
-    if clip.points is not None:
-        return replace(clip, timing=again, points=points_between(clip, times[present]))
     found = clip.sample(None, times[present])
     return with_rows(clip, again, lambda name, _: getattr(found, name))
-
-
-def _present(timing: Timing, times: Floats) -> Bools:
-    """Return whether the frames on both sides of each time, or the frame at it, exist: (T,)."""
-    if not timing.n_frames:
-        return np.zeros(0, dtype=np.bool_)
-    place = (times - timing.start) * timing.frame_rate
-    nearest = np.round(place)
-    place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
-    last = timing.n_frames - 1
-    before = np.clip(np.floor(place).astype(int), 0, last)
-    after = np.clip(np.ceil(place).astype(int), 0, last)
-    both: Bools = timing.present[before] & timing.present[after]
-    return both
-
-
-def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:
-    """Return points (T, K, 4), interpolated where both neighbours are visible.
-
-    Others keep the previous row's values or, with ``interpolate``, are invisible, even across gaps.
-    """
-    before, after, fraction = clip.timing.locate(times, interpolate)
-    start, end = clip.points[before], clip.points[after]
-    mixed = start + fraction[:, None, None] * (end - start)
-    both = (start[..., 3:] > 0.0) & (end[..., 3:] > 0.0)
-    return np.where(both, mixed, 0.0 if interpolate else start)
 
 
 # Interrupted tracks
@@ -143,10 +114,12 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
     count = clip.n_rows
     rows[frames] = count + np.arange(len(frames), dtype=np.int32)
     whole = replace(timing, rows=rows)
-    if clip.points is not None:
-        points = np.concatenate([clip.points, points_between(clip, times, interpolate=True)])
-        return replace(clip, timing=whole, points=points), Gaps(closed, left)
     found = clip.sample(None, times, interpolate=True)
+    if clip.points is not None and found.points is not None:
+        # Points that are not visible on both sides of a gap are not visible in it either.
+        before, after, _ = timing.locate(times, interpolate=True)
+        both = (clip.points[before, :, 3:] > 0.0) & (clip.points[after, :, 3:] > 0.0)
+        found = replace(found, points=np.where(both, found.points, 0.0))
     longer = with_rows(clip, whole, lambda name, rows: np.concatenate([rows, getattr(found, name)]))
     return longer, Gaps(closed, left)
 

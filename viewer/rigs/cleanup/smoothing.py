@@ -21,6 +21,7 @@ from viewer.rigs.geometry.quaternion import (
     align_signs,
     conjugate,
     multiply,
+    quaternion_to_rotation_vector,
     rotation_vector_to_quaternion,
 )
 
@@ -284,10 +285,4 @@ def moved(base: Floats, vectors: Floats) -> Floats:
 
 def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
     """Return rotation vectors v (..., 3) with q = b exp(v); q's sign decides up to 2 pi."""
-    found = multiply(conjugate(base), quaternions)
-    sine = np.linalg.norm(found[..., :3], axis=-1)
-    angle = 2.0 * np.arctan2(sine, found[..., 3])
-    # A rotation by nearly 0 has the factor angle / sin(angle / 2) = 2.
-    is_tiny = sine < np.finfo(float).tiny ** 0.5
-    factor = np.divide(angle, sine, out=np.full(sine.shape, 2.0), where=~is_tiny)
-    return factor[..., None] * found[..., :3]
+    return quaternion_to_rotation_vector(multiply(conjugate(base), quaternions))

@@ -19,6 +19,17 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
 
 
+def quaternion_to_rotation_vector(quaternions: Floats) -> Floats:
+    """Return r = 2 atan2(|v|, w) v / |v| of unit quaternions (v, w); 0 to 2 pi, to pi if w >= 0."""
+    # 2 atan2 is accurate at 0 and at pi, unlike 2 acos(w).
+    sines = np.linalg.norm(quaternions[..., :3], axis=-1)
+    angles = 2.0 * np.arctan2(sines, quaternions[..., 3])
+    # A rotation by nearly 0 has the factor angle / sin(angle / 2) = 2.
+    is_tiny = sines < np.finfo(float).tiny ** 0.5
+    factors = np.divide(angles, sines, out=np.full(sines.shape, 2.0), where=~is_tiny)
+    return factors[..., None] * quaternions[..., :3]
+
+
 def between(start: Floats, end: Floats) -> Floats:
     """Return the smallest rotations from direction a to b: q = (a x b, 1 + a . b) / |q|.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.quaternion import quaternion_to_rotation_vector
 
 _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
 
@@ -96,13 +97,7 @@ def matrix_to_quaternion(matrices: Floats) -> Floats:
 
 def matrix_to_rotation_vector(matrices: Floats) -> Floats:
     """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi radians."""
-    quaternions = matrix_to_quaternion(matrices)
-    sines = np.linalg.norm(quaternions[..., :3], axis=-1)
-    # 2 atan2 is accurate at 0 and at pi, unlike 2 acos(w).
-    angles = 2.0 * np.arctan2(sines, quaternions[..., 3])
-    is_zero = sines == 0.0
-    factors = np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
-    return quaternions[..., :3] * factors[..., None]
+    return quaternion_to_rotation_vector(matrix_to_quaternion(matrices))
 
 
 def matrix_to_euler(matrices: Floats) -> Floats:

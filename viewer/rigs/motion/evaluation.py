@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, span
 from viewer.rigs.constraints.evaluation import constrained
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.quaternion import multiply
@@ -81,19 +81,19 @@ def set_poses(
         turns = quaternion_to_matrix(found.rotations[rows])
         # Sliders keep to their limits; a motion is shown as it is, as exports write it.
         quaternions = rotate_joints(skeleton, dofs, found.rotated, turns, "quaternion")
-        parts.append(("rotations", _span(found.rotated), quaternions))
+        parts.append(("rotations", span(found.rotated), quaternions))
     elif len(found.targets):
         dofs = clamp_dofs(skeleton, dofs)
     if len(found.translated):
         offsets = _translate_joints(found, rows, skeleton, dofs)
-        parts.append(("translations", _span(found.translated), offsets))
+        parts.append(("translations", span(found.translated), offsets))
     if len(found.scaled):
-        parts.append(("scales", _span(found.scaled), found.scales[rows]))
+        parts.append(("scales", span(found.scaled), found.scales[rows]))
     if len(found.weighted):
         n_known = min(len(pose.shape_weights) for pose in poses)
         known = np.flatnonzero(found.weighted < n_known)
         weights = found.shape_weights[rows[:, None], known]
-        parts.append(("shape_weights", _span(found.weighted[known]), weights))
+        parts.append(("shape_weights", span(found.weighted[known]), weights))
     parts.append(("dofs", slice(None), dofs))
     for name, columns, values in parts:
         for pose, row in zip(poses, values, strict=True):
@@ -103,13 +103,6 @@ def set_poses(
             pose.figure_translation[:] = found.figure_translations[row]
         if found.figure_scales is not None:
             pose.figure_scale = float(found.figure_scales[row])
-
-
-def _span(columns: Ints) -> Ints | slice:
-    """Return consecutive indices as a slice, which is faster."""
-    first, count = int(columns[0]) if len(columns) else 0, len(columns)
-    is_row = np.array_equal(columns, np.arange(first, first + count))
-    return slice(first, first + count) if is_row else columns
 
 
 def _translate_joints(

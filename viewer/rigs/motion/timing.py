@@ -91,10 +91,7 @@ class Timing:
         nothing = np.full(len(times), -1, dtype=np.int32)
         if not self.n_frames or not self.present.any():
             return nothing, nothing, np.zeros(len(times))
-        place = (times - self.start) * self.frame_rate
-        nearest = np.round(place)
-        # Snapping undoes rounding in time * rate: exactly at a frame, its stored data is returned.
-        place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
+        place = self._places(times)
         outside = (place < 0.0) | (place > self.n_frames - 1)
         place = np.clip(place, 0.0, self.n_frames - 1)
         frame = np.floor(place).astype(np.int32)
@@ -113,6 +110,22 @@ class Timing:
             np.where(absent, -1, after).astype(np.int32),
             np.where(absent, 0.0, fraction),
         )
+
+    def surrounds(self, times: Floats) -> Bools:
+        """Return whether the frames on both sides of each time, or the frame at it, exist: (T,)."""
+        if not self.n_frames:
+            return np.zeros(len(times), dtype=np.bool_)
+        place = np.clip(self._places(times), 0.0, self.n_frames - 1)
+        before, after = np.floor(place).astype(np.int32), np.ceil(place).astype(np.int32)
+        both: Bools = self.present[before] & self.present[after]
+        return both
+
+    def _places(self, times: Floats) -> Floats:
+        """Return times in frames since the start; those close to a frame are at it."""
+        place = (times - self.start) * self.frame_rate
+        nearest = np.round(place)
+        # Snapping undoes rounding in time * rate: exactly at a frame, its stored data is returned.
+        return np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
 
     def _bridged(self, place: Floats) -> tuple[Ints, Ints, Floats]:
         there = np.flatnonzero(self.present)

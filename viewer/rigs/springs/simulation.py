@@ -400,13 +400,7 @@ class SpringMotion:
         skeleton, own = figure.require_skeleton(), axis_vector(figure.up)
         if self._up is None or skeleton.springs is None or np.allclose(own, self._up):
             return skeleton
-        middle = unit(own + self._up)
-        if not middle.any():
-            middle = np.eye(3)["yzx".index(figure.up)]
-        # Two rotations by 180 degrees: about the figure's up axis, and about the bisector of both
-        # axes.
-        first = 2.0 * np.outer(own, own) - np.eye(3)
-        turn = (2.0 * np.outer(middle, middle) - np.eye(3)) @ first
+        turn = quaternion_to_matrix(between(own, self._up))
         springs = skeleton.springs
         turned = replace(springs, gravities=springs.gravities @ turn.T)
         return replace(skeleton, springs=turned)

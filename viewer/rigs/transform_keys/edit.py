@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure, figure_pose
-from viewer.rigs.geometry.quaternion import conjugate, multiply
+from viewer.rigs.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.motion.clip import Channel, hermite
 from viewer.rigs.motion.clip_edit import move_keys, set_key
@@ -369,8 +369,7 @@ def with_interpolation(channel: TransformChannel, mode: Interpolation) -> Transf
     values = channel.values
     if channel.path == "rotation":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
-        far = np.einsum("na,na->n", values[1:], values[:-1]) < 0.0
-        values[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
+        align_signs(values)
     slopes = _smooth(channel.times, values)
     tangents = np.stack([slopes, slopes], axis=1)
     return replace(channel, values=values, interpolation=mode, tangents=tangents)
