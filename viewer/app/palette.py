@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import ink
-from viewer.app.core.widgets import note_item, overlay_rect, visible_rows
+from viewer.app.core.widgets import note_item, overlay_rect, pressed_step, visible_rows
 from viewer.data_classes import dataclass
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
@@ -126,8 +126,7 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
 def _move(palette: Palette) -> bool:
     """Move the highlight with the arrow keys, wrapping at the ends; return whether it moved."""
     count = len(palette.shown)
-    steps = {_K.down_arrow: 1, _K.up_arrow: -1, _K.page_down: _ROWS, _K.page_up: -_ROWS}
-    step = sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
+    step = pressed_step(_ROWS)
     if not step or not count:
         return False
     row = palette.row + step

@@ -114,6 +114,13 @@ def visible_rows(count: int, height: float = -1.0, wanted: int = -1) -> Iterator
         yield from range(clipper.display_start, clipper.display_end)
 
 
+def pressed_step(page: int) -> int:
+    """Return the rows by which pressed arrow and page keys move the highlight of a list."""
+    keys = imgui.Key
+    steps = {keys.down_arrow: 1, keys.up_arrow: -1, keys.page_down: page, keys.page_up: -page}
+    return sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
+
+
 def begin_dialog(title: str, width: float, name: str = "") -> tuple[bool, bool]:
     """Begin a dialog above everything else, of a width in window coordinates.
 
@@ -206,12 +213,17 @@ def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
     return value if why else result
 
 
-def button(state: AppState, label: str, why: str = "") -> bool:
-    """Draw a button and return whether it was pressed; disabled if there is a reason."""
+def button(
+    state: AppState, label: str, why: str = "", text: str = "", name: str = "", width: float = 0.0
+) -> bool:
+    """Draw a button and return whether it was pressed; disabled if there is a reason.
+
+    ``text``: its tooltip; ``name``: what it is recorded under, if not its label.
+    """
     with disabled(state, why):
-        pressed = imgui.button(label)
-        note_item(state, label)
-        explain("", why)
+        pressed = imgui.button(label, (width, 0.0))
+        note_item(state, name or label)
+        explain(text, why)
     return pressed and not why
 
 

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import name_field, text_field
-from viewer.app.core.widgets import button, note_item
+from viewer.app.core.widgets import button, note_item, pressed_step
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.files import Files
 from viewer.formats import FORMATS
@@ -198,11 +198,9 @@ def _move(dialog: FileDialog) -> bool:
     is_typing = imgui.get_io().want_text_input
     if is_typing and not dialog.is_path_active:
         return False
-    keys = imgui.Key
-    if not is_typing and imgui.is_key_pressed(keys.backspace, False):
+    if not is_typing and imgui.is_key_pressed(imgui.Key.backspace, False):
         dialog.enter(dialog.folder.parent)
-    steps = {keys.down_arrow: 1, keys.up_arrow: -1, keys.page_down: _PAGE, keys.page_up: -_PAGE}
-    step = sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
+    step = pressed_step(_PAGE)
     if step:
         dialog.move(step)
     return step != 0

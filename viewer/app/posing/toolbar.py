@@ -10,6 +10,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.theme import accent
 from viewer.app.core.widgets import (
     Rect,
+    button,
     choice,
     disabled,
     explain,
@@ -68,7 +69,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
             for number, (name, action, text, reason) in enumerate(rows):
                 if number:
                     imgui.same_line()
-                if _button(state, name, _item_width(len(rows)), text, reason):
+                if button(state, name, reason, text, f"tool {name}", _item_width(len(rows))):
                     action(state)
     rect = overlay_rect(state, "##tools")
     imgui.end()
@@ -85,7 +86,7 @@ def _draw_tools(state: AppState) -> None:
         is_on = state.of(Posing).tool == tool
         if is_on:
             imgui.push_style_color(imgui.Col_.button, accent())
-        pressed = _button(state, name, width, with_key(state, text, key), why)
+        pressed = button(state, name, why, with_key(state, text, key), f"tool {name}", width)
         if is_on:
             imgui.pop_style_color()
         if pressed:
@@ -96,14 +97,6 @@ def _item_width(count: int) -> float:
     """Return the width of each of several widgets in a row; all rows have the same width."""
     spacing = imgui.get_style().item_spacing.x
     return (_WIDTH * imgui.get_font_size() - spacing * (count - 1)) / count
-
-
-def _button(state: AppState, name: str, width: float, text: str, why: str) -> bool:
-    with disabled(state, why):
-        pressed = imgui.button(name, (width, 0.0))
-        note_item(state, f"tool {name}")
-        explain(text, why)
-    return pressed
 
 
 def _draw_settings(state: AppState) -> None:

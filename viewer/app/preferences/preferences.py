@@ -8,10 +8,8 @@ from dataclasses import Field, asdict, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import platformdirs
-
 from viewer.data_classes import dataclass, setting
-from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
+from viewer.media.state_files import as_json, config_file, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES, Quality
 
@@ -94,7 +92,7 @@ _RENAMED = {
 
 def preferences_file() -> Path:
     """Return the file that contains the preferences."""
-    return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "preferences.json"
+    return config_file("preferences.json")
 
 
 def load_preferences(say: Callable[[str], object] = to_stderr) -> Preferences:
