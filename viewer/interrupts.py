@@ -34,7 +34,7 @@ from contextlib import contextmanager
 # As in ``viewer/__init__.py``: every import here delays the installation of signal handlers.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from sys import UnraisableHookArgs
     from types import FrameType
     from typing import Any
@@ -61,6 +61,22 @@ class Interrupted(BaseException):
         return 128 + self.number
 
 
+def _replace_handlers(others: dict[int, Any], handler: Callable[..., None]) -> None:
+    """Handle all signals that are not ignored; ``others`` are given their previous handlers."""
+    for number in _SIGNALS:
+        other = signal.getsignal(number)
+        # nohup and shells ignore signals for background jobs; None is a handler in C.
+        if other not in (signal.SIG_IGN, None):
+            # Noted before the handler is called, which may raise.
+            others[number] = other
+            signal.signal(number, handler)
+
+
+def _restore_handlers(others: dict[int, Any]) -> None:
+    for number, other in others.items():
+        signal.signal(number, other)
+
+
 class _Watch:
     """The signals received between ``start`` and ``stop``, both called in the main thread."""
 
@@ -76,12 +92,7 @@ class _Watch:
         self._hook = sys.unraisablehook
 
     def start(self) -> None:
-        for number in _SIGNALS:
-            other = signal.getsignal(number)
-            # nohup and shells ignore signals for background jobs; None is a handler in C.
-            if other not in (signal.SIG_IGN, None):
-                self._others[number] = other
-                signal.signal(number, self._on_signal)
+        _replace_handlers(self._others, self._on_signal)
         self._hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
 
     def stop(self) -> None:
@@ -89,8 +100,7 @@ class _Watch:
         with self._lock:
             self._is_over = True
         sys.unraisablehook = self._hook
-        for number, other in self._others.items():
-            signal.signal(number, other)
+        _restore_handlers(self._others)
 
     def ignore(self) -> None:
         """Ignore signals permanently: the result is final, and the interpreter is shutting down."""
@@ -228,16 +238,11 @@ class Postponed:
 
     def start(self) -> None:
         """Replace the handlers of all signals that are not ignored."""
-        for number in _SIGNALS:
-            other = signal.getsignal(number)
-            if other not in (signal.SIG_IGN, None):
-                self._others[number] = other
-                signal.signal(number, self._on_signal)
+        _replace_handlers(self._others, self._on_signal)
 
     def stop(self) -> None:
         """Restore the previous handlers."""
-        for number, other in self._others.items():
-            signal.signal(number, other)
+        _restore_handlers(self._others)
         self._others = {}
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:

@@ -14,7 +14,7 @@ from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source, unreadable
-from viewer.phrases import Remedy, listed, printable
+from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:
     from viewer.formats._references import read_picture, referenced_path
@@ -325,17 +325,9 @@ def _detect_folder(source: Source) -> str:
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
-    from viewer.formats._published_models import published_names
+    from viewer.formats._published_models import refuse_models
 
-    models = published_names(source.path)
-    if models:
-        raise source.fault(
-            wording.MODEL_FOLDER,
-            names=listed(models, 12),
-            remedy=Remedy(
-                "choose it with File > Models > Choose model folder", "name it with --model-path"
-            ),
-        )
+    refuse_models(source)
     raise source.fault(wording.UNKNOWN_FOLDER)
 
 

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from viewer.diagnostics import wording
+from viewer.phrases import Remedy, listed
+
+if TYPE_CHECKING:
+    from viewer.formats._source import Source
 
 _VARIANTS = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
 
@@ -48,6 +55,19 @@ def published_name(path: Path) -> str:
             variant = match.groupdict().get("variant")
             return f"{kind}:{_VARIANTS.get(variant, variant)}" if variant else kind
     return ""
+
+
+def refuse_models(source: Source) -> None:
+    """Raise for a folder that contains models instead of one figure or motion."""
+    models = published_names(source.path)
+    if models:
+        raise source.fault(
+            wording.MODEL_FOLDER,
+            names=listed(models, 12),
+            remedy=Remedy(
+                "choose it with File > Models > Choose model folder", "name it with --model-path"
+            ),
+        )
 
 
 def published_names(folder: Path) -> list[str]:

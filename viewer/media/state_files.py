@@ -18,6 +18,13 @@ _LARGEST = 1 << 22  # bytes; all kept files are far smaller
 _MARK = b"; viewer "
 
 
+def config_file(name: str) -> Path:
+    """Return the file of settings that has a name; neither it nor its folder need exist."""
+    import platformdirs  # short commands need none
+
+    return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / name
+
+
 def to_stderr(text: str) -> None:
     """Print a message to standard error, if there is one."""
     if sys.stderr is not None:

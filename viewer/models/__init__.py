@@ -23,9 +23,9 @@ _KINDS = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx", "MHR": "mhr"}
 
 
 def _settings_file() -> Path:
-    import platformdirs  # imported only when models are searched for
+    from viewer.media.state_files import config_file
 
-    return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "models.json"
+    return config_file("models.json")
 
 
 def load_model_folder() -> Path | None:

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
-from viewer.formats._published_models import published_names
+from viewer.formats._published_models import refuse_models
 from viewer.formats._source import InvalidValueError, Source, too_large, unreadable
 from viewer.formats._text.json_places import (
     Keys,
@@ -28,7 +28,7 @@ from viewer.formats._text.json_places import (
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST, within_text
 from viewer.media.file_names import folder_name
-from viewer.phrases import Remedy, counted, listed, printable
+from viewer.phrases import counted, listed, printable
 
 _BODIES = ("smpl_full", "smplfull", "smpl")
 """Folders of body parameters, the most complete first."""
@@ -86,16 +86,7 @@ def find_frames(source: Source) -> FrameFiles:
             names = _first_camera(source, folder, inside)
         found.append(names)
     if not any(found):
-        models = published_names(source.path)
-        if models:
-            raise source.fault(
-                wording.MODEL_FOLDER,
-                names=listed(models, 12),
-                remedy=Remedy(
-                    "choose it with File > Models > Choose model folder",
-                    "name it with --model-path",
-                ),
-            )
+        refuse_models(source)
         raise source.fault(
             "F002.capture-frames: expected frame files (smpl_full, smplfull, smpl, "
             "keypoints3d: 000000.json …), found none"

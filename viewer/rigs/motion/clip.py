@@ -24,7 +24,7 @@ from viewer.phrases import all_of
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields, frozen
 from viewer.rigs.memo import Memo
 from viewer.rigs.motion.samples import Samples
-from viewer.rigs.motion.timing import DEFAULT_RATE
+from viewer.rigs.motion.timing import DEFAULT_RATE, check_range
 from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import DOF_KINDS, Skeleton, clamp_dofs, joint_label
 
@@ -107,10 +107,7 @@ class Clip:
     """Playback range in seconds; the curves continue beyond it."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", float(self.start))
-        object.__setattr__(self, "end", float(self.end))
-        if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
-            raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+        check_range(self, self.name, self.start, self.end)
 
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False

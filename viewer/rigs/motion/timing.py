@@ -45,6 +45,14 @@ def frame_times(start: float, end: float, rate: float) -> Floats:
     return np.minimum(times, end)
 
 
+def check_range(clip: object, name: str, start: float, end: float) -> None:
+    """Make the playback range of a new clip two floats; RigError unless they are one."""
+    object.__setattr__(clip, "start", float(start))
+    object.__setattr__(clip, "end", float(end))
+    if not (math.isfinite(start) and start <= end < math.inf):
+        raise RigError(f"clip {name}: expected a range, found {float(start)} to {float(end)}")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Timing:
     """A fixed frame rate, and the data row of each frame."""

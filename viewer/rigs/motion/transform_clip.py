@@ -20,7 +20,7 @@ from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints, freeze_fields
 from viewer.rigs.memo import Memo
 from viewer.rigs.motion.samples import Samples
-from viewer.rigs.motion.timing import DEFAULT_RATE
+from viewer.rigs.motion.timing import DEFAULT_RATE, check_range
 
 if TYPE_CHECKING:
     from viewer.rigs.skeleton import Skeleton
@@ -116,10 +116,7 @@ class TransformClip:
     """Index of its animation in the file, which may move several figures; -1 if unknown."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", float(self.start))
-        object.__setattr__(self, "end", float(self.end))
-        if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
-            raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+        check_range(self, self.name, self.start, self.end)
 
     @property
     def sets_shape(self) -> bool:
