@@ -153,6 +153,33 @@ def test_small_separate_part_moves_rigidly_and_is_named():
         )
 
 
+@pytest.mark.parametrize("method", BINDING)
+def test_part_that_two_sides_share_moves_with_the_joint_above_both(method):
+    # A beam rests on two posts: without a vertex between its ends, it cannot bend. About a quarter
+    # is nearest to the joint in its middle, and more to each side.
+    posts = [box((x - 0.1, 0, -0.1), (x + 0.1, 1.0, 0.1), (2, 10, 2)) for x in (-0.9, 0.9)]
+    beam = box((-1.0, 0.98, -0.08), (1.0, 1.18, 0.08), (1, 1, 1))
+    joints = {"middle": ("", (0, 1.08, 0))}
+    for name, x in (("left", -1.0), ("right", 1.0)):
+        joints |= {name: ("middle", (0.25 * x, 1.08, 0)), name + "_2": (name, (0.9 * x, 1.08, 0)),
+                   name + "_end": (name + "_2", (0.9 * x, 0.1, 0))}  # fmt: skip
+    rigged = bound(skeleton_of(joints), joined(*posts, beam), method)
+    assert (of(rigged, "middle")[-8:] == 1.0).all()
+    # Of one line of joints, none is above branches: the part keeps its weights.
+    line = box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), (1, 1, 1))
+    shared = bound(skeleton_of(CHAIN), joined(line, box((3, 0, 0), (3.1, 0.1, 0.1), (1, 1, 1))))
+    assert (of(shared, "base")[:8] < 1.0).any()
+
+
+def test_skeleton_at_one_point_or_far_smaller_than_the_mesh_is_named_so():
+    mesh = joined(BAR)
+    tiny = {name: (above, np.multiply(place, 1e-5) + 7) for name, (above, place) in CHAIN.items()}
+    point = {name: (above, (7.0, 7, 7)) for name, (above, _) in CHAIN.items()}
+    for joints, said in ((tiny, "over 1000 times smaller than the mesh"), (point, "at one point")):
+        with pytest.raises(RigError, match=f"found 0 of 2 there and a skeleton {said}"):
+            bound(skeleton_of(joints), mesh, scale="none")
+
+
 def test_mesh_with_both_sides_of_each_triangle_is_bound_like_one_with_one():
     positions, triangles = BAR
     both = mesh_of(positions, np.concatenate([triangles, triangles[:, ::-1]]))

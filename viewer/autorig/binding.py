@@ -68,6 +68,7 @@ _TELLING = 0.5  # fraction of joints with weights from which the others are know
 # Networks that predict skeletons scale the longest side of a mesh to 2, centred, or to 1.
 _NORMALISED = (2.0, 1.0)
 _ROUNDING = 1e-9
+_MOST_TIMES = 1000  # ratio of sizes beyond which the number says no more
 
 
 def enclosed(target: Mesh) -> tuple[Welded, Solid]:
@@ -121,7 +122,7 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         placed,
         *_weight_lines(mesh, found, how.method),
         *(with_joint_name(line, figure) for line in rigid_lines(weights.rigid, from_bones=True)),
-        *_bone_lines(skeleton, bones),
+        *_bone_lines(skeleton, bones, skin),
         *check_lines(figure, guarded, out, residual),
     )
     rigged = Rigged(
@@ -338,10 +339,21 @@ def _placed_line(found: Similarity, inside: int, count: int, before: int | None)
 def _misplaced(source: Figure, inside: int, count: int, size: float) -> RigError:
     return RigError(
         f"skeleton {printable(source.name, 60)}: expected its joints inside the mesh, found "
-        f"{inside} of {count} there and a skeleton {size:.2g} times as large as the mesh; other "
+        f"{inside} of {count} there and a skeleton {_compared(size)}; other "
         "units and up axes fit no better: place it with --landmarks, or pose it with "
         "--template-pose or --template-frame"
     )
+
+
+def _compared(size: float) -> str:
+    """Return how large a skeleton is, relative to the mesh, in words."""
+    if size == 0.0:
+        return "at one point"
+    ratio = max(size, 1.0 / size)
+    times = f"over {_MOST_TIMES}" if ratio > _MOST_TIMES else f"{rounded(ratio, 2)}"
+    if times == "1":
+        return "as large as the mesh"
+    return f"{times} times {'as large as' if size > 1.0 else 'smaller than'} the mesh"
 
 
 def _moved(skeleton: Skeleton, pose: Pose, place: Similarity) -> tuple[Skeleton, Pose, Floats]:
@@ -416,16 +428,25 @@ def _weight_lines(mesh: Welded, found: BoneWeights, method: str) -> Iterator[Dia
     )
 
 
-def _bone_lines(skeleton: Skeleton, bones: Bones) -> Iterator[Diagnostic]:
-    """Return a message about the joints without weights."""
+def _bone_lines(skeleton: Skeleton, bones: Bones, skin: Skin) -> Iterator[Diagnostic]:
+    """Return messages about the joints without weights."""
     joints = bones.joints
-    idle = np.setdiff1d(shown_joints(skeleton), joints)
-    labels = [joint_label(skeleton, joint) for joint in idle.tolist()]
-    if not labels:
+    outside = np.setdiff1d(shown_joints(skeleton), joints)
+    labels = [joint_label(skeleton, joint) for joint in outside.tolist()]
+    if labels:
+        yield note(
+            "R008.some-bones: {n} bound; no bone in the mesh, so no weights: {idle}",
+            n=counted(len(joints), "joint"),
+            idle=listed(labels, 8),
+        )
+    else:
         yield note("R008.bones: {n} bound", n=counted(len(joints), "joint"))
-        return
-    yield note(
-        "R008.some-bones: {n} bound; no bone in the mesh, so no weights: {idle}",
-        n=counted(len(joints), "joint"),
-        idle=listed(labels, 8),
-    )
+    # The end of a limb often has none.
+    inner = np.intersect1d(joints, skeleton.parents)
+    moved = np.intersect1d(inner, idle_joints(skin, skeleton))
+    if len(moved):
+        yield note(
+            "R008.stiff-parts: no weights: {idle}; the vertices around them move with other "
+            "joints, as parts that do not bend do",
+            idle=listed([joint_label(skeleton, joint) for joint in moved.tolist()], 8),
+        )

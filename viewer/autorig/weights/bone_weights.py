@@ -22,7 +22,9 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.topology import part_volumes
 from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.hierarchy import path_to_root
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import triangle_areas
 from viewer.rigs.retargeting.joint_names import name_tokens
@@ -67,6 +69,8 @@ _RIGID = 0.8  # fraction of a part's vertices that are nearest to one joint, so 
 # would shear it.
 _MOSTLY = 0.6
 _SAMPLES = 20_000  # of the surface of all such parts
+_CONVEX = 0.8  # fraction of its convex hull that a part without limbs of its own fills
+_SHARE = 0.1  # fraction of that area, from which a joint counts where several branches share a part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +83,8 @@ class Bones:
     """(J + 1,). Joint j has the points from ``starts[j]`` up to ``starts[j + 1]``, maybe none."""
     outside: Bools
     """(J,). Joints outside the mesh, without roots and controls."""
+    parents: Ints
+    """(J,). The joint above each that is shown; -1 for none."""
 
     @property
     def joints(self) -> Ints:
@@ -155,7 +161,7 @@ def bones_in(
     kept = solid.gaps(points) <= NEAR * space
     counts = np.bincount(owner[kept], minlength=count)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    return Bones(points[kept], starts, plays & ~is_near & (parents >= 0))
+    return Bones(points[kept], starts, plays & ~is_near & (parents >= 0), parents)
 
 
 def names_control(skeleton: Skeleton) -> Bools:
@@ -389,9 +395,10 @@ def _unit_rows(rows: csr_array, where: NDArray[np.integer], joints: Ints) -> csr
 
 
 def _stiff_votes(mesh: Welded, solid: Solid, bones: Bones) -> Floats:
-    """Return the fraction of the area of each stiff island that is nearest to each joint: (I, J).
+    """Return the fraction of the area of each stiff island that moves with each joint: (I, J).
 
-    Its few vertices are at its ends, where other bones begin. Rows of other islands are 0.
+    That is the joint with the nearest bone, as the few vertices of the island are at its ends,
+    where other bones begin. Rows of other islands are 0.
     """
     owners = mesh.islands[mesh.triangles[:, 0]]
     triangles = mesh.triangles[stiff_islands(mesh)[owners]]
@@ -402,7 +409,39 @@ def _stiff_votes(mesh: Welded, solid: Solid, bones: Bones) -> Floats:
     where = mesh.islands[triangles[samples.triangles, 0]]
     joints, _ = _nearest_through(solid, bones, samples.positions)
     np.add.at(votes, (where, joints), 1.0)
-    return votes / np.maximum(votes.sum(axis=1, keepdims=True), 1.0)
+    votes /= np.maximum(votes.sum(axis=1, keepdims=True), 1.0)
+    for island in np.flatnonzero(votes.max(axis=1) > 0.0).tolist():
+        above = _above_branches(votes[island], bones.parents)
+        if above >= 0 and votes[island].max() < _MOSTLY and _is_convex(mesh, island):
+            votes[island] = np.arange(votes.shape[1]) == above
+    return votes
+
+
+def _above_branches(votes: Floats, parents: Ints) -> int:
+    """Return the joint above several branches that share a part; -1 if one line of joints has it.
+
+    The armrest between the back and the seat of a chair, or a chest between two arms, would be
+    sheared by its joints, or go to one side.
+    """
+    sharing = np.flatnonzero(votes >= _SHARE).tolist()
+    lines = [path_to_root(parents, joint) for joint in sharing]
+    longest = max(lines, key=len, default=[])
+    if set(sharing) <= {*longest}:
+        return -1
+    return next((joint for joint in longest if all(joint in line for line in lines)), -1)
+
+
+def _is_convex(mesh: Welded, island: int) -> bool:
+    """Return whether an island has no limbs of its own, as trousers have, in its convex hull."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    corners = mesh.positions[mesh.triangles[mesh.islands[mesh.triangles[:, 0]] == island]]
+    try:
+        hull = ConvexHull(corners.reshape(-1, 3)).volume
+    except QhullError:  # flat
+        return True
+    volume = float(part_volumes(corners, np.zeros(len(corners), dtype=np.int32), 1)[0][0])
+    return abs(volume) >= _CONVEX * hull
 
 
 def _finished(
