@@ -37,6 +37,7 @@ from viewer.autorig.medial import LevelSets, Paths, Protrusion
 from viewer.autorig.parts import MOST_PARTS, Parts, parts_of
 from viewer.autorig.settings import SkeletonSettings
 from viewer.autorig.solid import Solid, solid_within
+from viewer.autorig.weights.bone_weights import NEAR
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
@@ -56,6 +57,9 @@ _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of t
 # fraction of the solid there for which sheets are reported.
 _FAR, _MISSED = 2.0, 0.1
 _MOST_LOOPS = 20  # loops that are cut: each takes a search
+# Length of the corners of a cut, which are no limbs, and their distance from its middle: relative
+# to its half width.
+_RAGGED = 2.0
 _SAME = 2.0  # distance in voxels up to which cuts are one: some need two searches
 # Least radius, relative to the largest one, of the place where the search for the trunk begins: the
 # deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
@@ -74,6 +78,9 @@ _NARROWER = 0.8  # radius of a limb relative to that of the hub, below which it 
 # What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
 # to the solid's, and the ratio of the foot's radius to theirs.
 _FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
+_BODY = (
+    2.0  # radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake
+)
 
 # Joints along limbs.
 _TOLERANCE = 0.5  # of the polyline, relative to the half width
@@ -173,6 +180,7 @@ class _Field:
         self._least = max(_SHORTEST * size, _VOXELS * solid.spacing)
         self.cuts = np.zeros((0, 3))
         """(C, 3). Places where loops were cut."""
+        self._cut_widths: list[float] = []
         self.has_loops = False
         """Whether more loops are left."""
         while True:
@@ -188,6 +196,7 @@ class _Field:
                 self.has_loops = True
                 break
             self.cuts = np.concatenate([self.cuts, self.centers[ends].mean(axis=0)[None]])
+            self._cut_widths.append(float(self._widths[np.concatenate(loop)].max()))
         self._middles = self._levels.middles(self.centers)
         self.tips = self._levels.tips(self._is_limb)
         routes = paths.to(np.array([source]), self.tips.rows)
@@ -201,7 +210,15 @@ class _Field:
             if found.tip - junction >= _LONG * float(self._widths[list(base)].max()):
                 return True
         width = float(self._widths[list(found.base)].max())
-        return found.tip - found.junction >= max(_OWN * width, self._least)
+        is_long = found.tip - found.junction >= max(_OWN * width, self._least)
+        return is_long and not self._is_at_cut(found)
+
+    def _is_at_cut(self, found: Protrusion) -> bool:
+        """Return whether a protrusion is no longer than a cut is wide and begins there."""
+        middle = self._middles[list(found.base)].mean(axis=0)
+        gaps = np.linalg.norm(self.cuts - middle, axis=1)
+        near = gaps <= _RAGGED * np.array(self._cut_widths)
+        return bool(near.any()) and found.tip - found.junction <= _RAGGED * max(self._cut_widths)
 
     def _stands(self, tip: int, route: Ints) -> bool:
         """Return whether a tip is that of a limb, not of a ball, plate or box."""
@@ -224,7 +241,11 @@ class _Field:
     def path(self, rows: Ints, ends: tuple[Floats, Floats | None], width: float) -> Floats:
         """Return a smooth path between ends along voxels (K,): (K, 3)."""
         middles = self._middles[self._levels.labels[rows]]
-        points = _centred(self.centers[rows], middles, self.widths(rows))
+        points = self.centers[rows]
+        # The middle of a level set may be beside the path, or in the hollow of a mug.
+        near = np.linalg.norm(middles - points, axis=1) <= 0.5 * self.widths(rows)
+        near &= self.solid.gaps(middles) <= NEAR * self.solid.spacing
+        points = np.where(near[:, None], middles, points)
         points[0] = ends[0]
         if ends[1] is not None:
             points[-1] = ends[1]
@@ -240,7 +261,7 @@ class _Field:
 def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
     """Return the paths from the tips of a solid to one of its voxels, as hubs and chains."""
     field = _Field(solid, paths, source)
-    hub_of, hubs = _hubs(field.routes, paths.radii, field.centers, source)
+    hub_of, hubs = _hubs(field, source)
     passed = {k: {hub_of.get(row) for row in route.tolist()} for k, route in field.routes.items()}
     members = [[row for row, hub in hub_of.items() if hub == number] for number in range(len(hubs))]
     places = np.array([field.centers[rows].mean(axis=0) for rows in members])
@@ -255,12 +276,19 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
             if any(number in chain.tips and chain.end == end for chain in chains):
                 continue
             beyond = frozenset({number, *(k for k in passed if end >= 0 and end in passed[k])})
-            width = max(float(np.median(field.widths(rows))), solid.spacing)
-            ends = places[start], places[end] if end >= 0 else None
-            points = field.path(rows, ends, width)
             wide = float(paths.radii[hubs[start]])
             reached = _beginning(field, rows, field.parting(beyond), wide, end >= 0)
-            begin = float(arc_lengths(points)[reached])
+            width = max(float(np.median(field.widths(rows[reached:]))), solid.spacing)
+            ends = places[start], places[end] if end >= 0 else None
+            points = field.path(rows, ends, width)
+            lengths = arc_lengths(points)
+            early = lengths >= float(lengths[reached]) - _HINGE * width
+            for sooner in range(reached, int(early.argmax()) - 1, -1):
+                if _is_inside(solid, points[0], points[sooner]):
+                    # The bone from the hub need not leave the solid, as below a seat to a leg.
+                    reached = sooner
+                    break
+            begin = float(lengths[reached])
             chains.append(Chain(start, end, points, width, begin, beyond))
     ordered = tuple(sorted(chains, key=lambda chain: chain.start))
     rows = np.array(hubs, dtype=np.int32)
@@ -295,16 +323,17 @@ def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner:
     return reached
 
 
-def _hubs(
-    outwards: dict[int, Ints], radii: Floats, centers: Floats, source: int
-) -> tuple[dict[int, int], list[int]]:
+def _hubs(field: _Field, source: int) -> tuple[dict[int, int], list[int]]:
     """Return the hub of each voxel where paths part, and the first voxel of each hub."""
+    radii, centers = field.radii, field.centers
     above, along = {source: source}, {source: 0.0}
     below: dict[int, set[int]] = {source: set()}
-    for route in outwards.values():
+    beyond: dict[int, set[int]] = {}
+    for number, route in field.routes.items():
         rows = route.tolist()
         for before, row in pairwise(rows):
             below[before].add(row)
+            beyond.setdefault(row, set()).add(number)
             if row not in above:
                 above[row], below[row] = before, set()
                 step = centers[row] - centers[before]
@@ -314,6 +343,17 @@ def _hubs(
     for row in parting:
         if row == source:
             continue
+        if field.distances[row] + radii.max() < field.parting(frozenset(beyond[row])):
+            # Far inside of a part that is wider than thick, as a seat, other limbs still have the
+            # same level sets: it is one part, although the paths to a leg and to an arm have some
+            # of their way in common. In a part as thick as wide, a hub is a shoulder; behind a
+            # waist, it belongs to another part.
+            way = [row]
+            while way[-1] not in hub_of:
+                way.append(above[way[-1]])
+            if radii[way].min() >= _NARROWER * radii[way].max():
+                hub_of[row] = hub_of[way[-1]]
+                continue
         # In a wide part, several paths may run beside each other.
         gaps = np.linalg.norm(centers[hubs] - centers[row], axis=1)
         gaps = gaps / (_REACH * np.maximum(radii[hubs], radii[row]))
@@ -334,13 +374,6 @@ def _parts(route: Ints, hub_of: dict[int, int]) -> Iterator[tuple[int, int]]:
         same = hub_of.get(int(route[last]), -1) == hub_of[int(route[first])]
         if last > first and not same:
             yield first, last
-
-
-def _centred(points: Floats, middles: Floats, widths: Floats) -> Floats:
-    """Return a path (K, 3) through the middles of its level sets, unless these are beside it."""
-    near = np.linalg.norm(middles - points, axis=1) <= 0.5 * widths
-    centred: Floats = np.where(near[:, None], middles, points)
-    return centred
 
 
 def _smooth(points: Floats, rounds: int) -> Floats:
@@ -395,6 +428,10 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     ):
         return inside[foot]
     if len(inwards) == 2:
+        between = sum(chain.start == 0 for chain in tree.chains) == 2
+        thickest = max(chain.half_width for chain in tree.chains)
+        if between and tree.radii[0] >= _BODY * thickest:
+            return int(tree.rows[0])
         return _thicker_end(solid, paths, [int(route[0]) for route in inwards])
     # As in the centroid of a tree, with tips as weights; ties go to the wider place.
     count = len(tree.routes)
@@ -433,9 +470,12 @@ def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, 
     Also returns whether they are where it bends or where its parts meet.
     """
     width = chain.half_width
-    stop = chain.length - (_END * width if chain.end < 0 else 0.0)
+    # A part that does not bend moves with the joint at its base: the last one is at its very end.
+    is_bending = chain.end < 0 and not (chain.stiff and chain.stiff[-1])
+    stop = chain.length - (_END * width if is_bending else 0.0)
     start = min(chain.begin, stop)
-    first = [start] if start > 0.0 and stop - start >= width else []
+    # A short limb, too, begins with a joint at its base: one at its tip would not move it.
+    first = [start] if start > 0.0 and stop - start >= _END * width else []
     near = _HINGE * width
     seams = [length for length in chain.seams if start - near <= length <= stop - width]
     if seams and seams[0] <= start + near:
@@ -450,6 +490,34 @@ def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, 
             found = [*found, *_inner_joints(chain, begin, end, spacing, factor)[0]]
         found = [*found, end]
     return np.array(found), True
+
+
+def bones_inside(chain: Chain, lengths: Floats, solid: Solid) -> Floats:
+    """Return the lengths (N,) of a chain's joints, with more where bones would leave the solid.
+
+    A bone that takes a short cut, as across a frame or the inside of a mug, would bind what it
+    passes to the wrong joint.
+    """
+    found, todo = [], [*pairwise([chain.begin, *lengths.tolist()])]
+    while todo:
+        begin, end = todo.pop()
+        found.append(end)
+        if end - begin <= max(chain.half_width, 2.0 * solid.spacing):
+            continue
+        count = 2 + int((end - begin) / solid.spacing)
+        way = at_lengths(chain.points, np.linspace(begin, end, count))
+        if not _is_inside(solid, way[0], way[-1]):
+            apart = np.linalg.norm(way - _nearest_on(way, way[0], way[-1]), axis=1)
+            middle = begin + (end - begin) * float(apart.argmax()) / (count - 1)
+            todo += [(begin, middle), (middle, end)]
+            found.pop()
+    return np.array(sorted(found))
+
+
+def _is_inside(solid: Solid, start: Floats, end: Floats) -> bool:
+    """Return whether a bone between two points (3,) stays in the solid."""
+    count = 2 + int(np.linalg.norm(end - start) / solid.spacing)
+    return bool(solid.gaps(np.linspace(start, end, count)).max() <= NEAR * solid.spacing)
 
 
 def _is_stiff(chain: Chain, begin: float, end: float) -> bool:
@@ -509,12 +577,10 @@ def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
     todo = [(0, len(path) - 1)]
     while todo:
         first, last = todo.pop()
-        chord = path[last] - path[first]
-        inner = path[first + 1 : last] - path[first]
+        inner = path[first + 1 : last]
         if len(inner) == 0:
             continue
-        along = np.clip(inner @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
-        gaps = np.linalg.norm(inner - along[:, None] * chord, axis=1)
+        gaps = np.linalg.norm(inner - _nearest_on(inner, path[first], path[last]), axis=1)
         if gaps.max() > tolerance:
             middle = first + 1 + int(gaps.argmax())
             found.append(middle)
@@ -539,6 +605,14 @@ def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
             break
         del found[weak]
     return found
+
+
+def _nearest_on(points: Floats, start: Floats, end: Floats) -> Floats:
+    """Return the points of a line from ``start`` to ``end`` that are nearest to others (N, 3)."""
+    chord = end - start
+    along = np.clip((points - start) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+    nearest: Floats = start + along[:, None] * chord
+    return nearest
 
 
 def _is_jointed(path: Floats, bends: list[int], around: float) -> bool:
@@ -648,7 +722,7 @@ def _is_central(tree: Tree, number: int, plane: _Plane, spacing: float) -> bool:
     end = chain.points[-1]
     others = [other.points[-1] for other in tree.chains if other is not chain]
     gaps = np.linalg.norm(np.array(others).reshape(-1, 3) - plane.mirrored(end), axis=1)
-    return bool(2.0 * abs(float(plane.sides(end))) <= gaps.min(initial=np.inf))
+    return bool(abs(float(plane.sides(end))) <= gaps.min(initial=np.inf))
 
 
 def _as_limb(chain: Chain, plane: _Plane) -> Limb:
@@ -768,9 +842,8 @@ def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
         )
     if found.has_loops:
         yield note(
-            "R016.more-loops: more loops than the {n} that were cut: in each other loop, one side "
-            "has no joints; --skeleton takes a skeleton that has them",
-            n=len(found.cuts),
+            "R016.more-loops: not all loops are cut: of each other one, one side has no joints; "
+            "--skeleton takes a skeleton that has them"
         )
     if found.missed > _MISSED:
         yield note(
@@ -838,7 +911,7 @@ def joints_in(
     if plane is not None and not is_facing_known:
         # The front is in the plane of symmetry: a figure along x does not face along z.
         front = np.cross(plane.lateral, up)
-    points = _joint_points(tree, plane, partner, solid.spacing, how.joint_spacing)
+    points = _joint_points(solid, tree, plane, partner, how.joint_spacing)
     heights = solid.centers(solid.voxels) @ up
     low = float(heights.min()) + _ON_GROUND * float(np.ptp(heights))
     labels = _Names(tree, plane, partner, front if is_facing_known else None)
@@ -946,15 +1019,16 @@ def _on(plane: _Plane | None, points: Floats) -> Floats:
 
 
 def _joint_points(
-    tree: Tree, plane: _Plane | None, partner: dict[int, int], voxel: float, factor: float
+    solid: Solid, tree: Tree, plane: _Plane | None, partner: dict[int, int], factor: float
 ) -> list[Floats]:
     """Return the joints of each chain, without the first hub and with the last one: (N, 3)."""
+    voxel = solid.spacing
     found = [np.zeros((0, 3))] * len(tree.chains)
     for number, chain in enumerate(tree.chains):
         other = partner.get(number)
         if other is not None and other < number:
             continue
-        fractions, bends = _fractions(chain, voxel, factor)
+        fractions, bends = _fractions(chain, solid, factor)
         path = at_lengths(chain.points, np.linspace(chain.begin, chain.length, _SAMPLES))
         if other is None:
             if plane is not None and _is_central(tree, number, plane, voxel):
@@ -963,7 +1037,7 @@ def _joint_points(
             continue
         assert plane is not None  # only a plane of symmetry has two sides
         twin = tree.chains[other]
-        theirs, they_bend = _fractions(twin, voxel, factor)
+        theirs, they_bend = _fractions(twin, solid, factor)
         there = at_lengths(twin.points, np.linspace(twin.begin, twin.length, _SAMPLES))
         gap = float(np.linalg.norm(path - plane.mirrored(there), axis=1).max())
         is_mirrored = gap <= _MIRRORED * max(chain.half_width, twin.half_width, voxel)
@@ -982,9 +1056,15 @@ def _joint_points(
     return found
 
 
-def _fractions(chain: Chain, voxel: float, factor: float) -> tuple[Floats, bool]:
-    """Return ``joint_lengths`` from 0 where a chain leaves its hub to 1 at its end."""
-    lengths, bends = joint_lengths(chain, voxel, factor)
+def _fractions(chain: Chain, solid: Solid, factor: float) -> tuple[Floats, bool]:
+    """Return the joints' lengths from 0 where a chain leaves its hub to 1 at its end.
+
+    Also returns whether they are where it bends or where its parts meet.
+    """
+    lengths, bends = joint_lengths(chain, solid.spacing, factor)
+    inside = bones_inside(chain, lengths, solid)
+    bends |= len(inside) > len(lengths)
+    lengths = inside
     lengths = np.maximum(lengths - chain.begin, 0.0)
     return lengths / max(chain.length - chain.begin, 1e-300), bends
 
