@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeTree
+from viewer.rigs.geometry.topology import components
 from viewer.rigs.hierarchy import roots_of, with_ancestors
 
 _MOST_TREES = 16  # maximum number of separate figures made from root trees of rigid meshes
@@ -81,7 +82,6 @@ class _Grouping:
         self.place = {node: place for place, node in enumerate(self.order)}
         self.mesh_nodes = [n for n in self.order if self.meshes[n] in self.drawn]
         self.skins = self._skins()
-        self.same = list(range(len(file.skins)))
         self.owners = self._owners()
         self.figures: dict[tuple[str, int], Members] = {}
         # Nodes of each figure that must be joints; their ancestors are added later.
@@ -90,7 +90,7 @@ class _Grouping:
     def result(self) -> list[Members]:
         """Return the figures."""
         for skin in self.skins:
-            figure, wanted = self._figure(("skin", self._find(skin)))
+            figure, wanted = self._figure(("skin", self.same[skin]))
             figure.skins.append(skin)
             wanted.update(self.file.skins[skin].joints.tolist())
         for node in self.mesh_nodes:
@@ -127,19 +127,16 @@ class _Grouping:
             for node in self.file.skins[skin].joints.tolist():
                 of_node.setdefault(node, []).append(skin)
         owners: dict[int, int] = {}
+        links = list[tuple[int, int]]()
         for node in self.order:
             above = owners.get(self.parents[node])
             own = of_node.get(node, [])
             for skin in own if above is None else [above, *own]:
                 owners[node] = skin
-                self.same[self._find(skin)] = self._find(own[0] if own else skin)
+                links.append((skin, own[0] if own else skin))
+        pairs = np.array(links, dtype=np.int32).reshape(-1, 2)
+        self.same = components(len(self.file.skins), pairs).tolist()
         return owners
-
-    def _find(self, skin: int) -> int:
-        """Return the representative of a skin's figure, shortening the path to it."""
-        while self.same[skin] != skin:
-            self.same[skin] = skin = self.same[self.same[skin]]
-        return skin
 
     def _figure(self, key: tuple[str, int]) -> tuple[Members, set[int]]:
         return self.figures.setdefault(key, Members()), self.wanted.setdefault(key, set())
@@ -147,7 +144,7 @@ class _Grouping:
     def _add_mesh(self, node: int) -> None:
         mesh, skin = self.file.meshes[self.meshes[node]], int(self.tree.skins[node])
         if skin >= 0 and any(p.joints is not None for p in mesh.primitives):
-            key = "skin", self._find(skin)
+            key = "skin", self.same[skin]
         else:
             key = self._key(node)
         figure, wanted = self._figure(key)
@@ -158,7 +155,7 @@ class _Grouping:
     def _key(self, node: int) -> tuple[str, int]:
         """Return the key of the figure to which a node without a skin belongs."""
         if node in self.owners:
-            return "skin", self._find(self.owners[node])
+            return "skin", self.same[self.owners[node]]
         return ("root", int(self.roots[node])) if self.skins else ("all", 0)
 
     def _add_animated(self) -> None:
