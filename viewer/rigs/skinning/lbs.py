@@ -13,11 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.vectors import inverse_transposed, unit
+from viewer.rigs.kinematics import are_alike, rigid_sizes
 from viewer.rigs.memo import Memo
 from viewer.rigs.skin import Skin, has_influence
-from viewer.rigs.skinning._normals import rigid_vertices
 
 # Number of matrices per chunk, which fits into the processor's cache and limits the memory.
 _CHUNK = 1 << 14
@@ -162,3 +162,23 @@ def _blocks(skin: Skin) -> Iterator[_Block]:
         np.add.at(weights, (columns, owners), skin.weights[span])
         free = np.flatnonzero(is_free[first:last]).astype(np.int32)
         yield _Block(slice(first, last), joints, weights, free)
+
+
+def rigid_vertices(skin: Skin, palette: Floats) -> Bools:
+    """Return which vertices (V,) have only joints that rotate, up to one common scale.
+
+    Their normals follow the blended matrix, others the inverse transpose.
+    """
+    sizes = rigid_sizes(palette)
+    rigid = np.ones(skin.n_vertices, dtype=np.bool_)
+    if len(sizes) == 0 or are_alike(sizes.min(), sizes.max()):
+        return rigid
+    moving = np.flatnonzero(np.diff(skin.starts) > 0)
+    if len(moving):
+        own, is_used = sizes[skin.joints], skin.weights != 0.0
+        edges = skin.starts[moving]
+        lowest = np.minimum.reduceat(np.where(is_used, own, np.inf), edges)
+        highest = np.maximum.reduceat(np.where(is_used, own, -np.inf), edges)
+        with np.errstate(invalid="ignore"):
+            rigid[moving] = are_alike(lowest, highest) | (lowest > highest)
+    return rigid

@@ -8,7 +8,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.vectors import inverse_transposed, unit
 from viewer.rigs.skin import Skin, skin_rows
 from viewer.rigs.skinning import dqs, lbs
-from viewer.rigs.skinning._normals import rigid_vertices
+from viewer.rigs.skinning.lbs import rigid_vertices
 
 
 def deform(
