@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.phrases import file_size
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.view import View, light_axes
@@ -107,7 +108,7 @@ def limit_passes(
     if memory > _MOST_BYTES:
         options.quality = "normal"
         return [
-            f"drawn with normal quality, as final needs {memory / 1e9:.1f} GB of graphics memory "
+            f"drawn with normal quality, as final needs {file_size(memory)} of graphics memory "
             "in addition to the image; --quality final draws it"
         ]
     if not is_software(context):

@@ -257,7 +257,7 @@ def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch):
 
         monkeypatch.setattr(upload, "check_errors", second_fails)
         moved = replace(figure, mesh=replace(mesh, positions=mesh.positions + 0.1))
-        with pytest.raises(RenderError, match=r"^a shaped mesh of 0\.\d MB: not enough"):
+        with pytest.raises(RenderError, match=r"^a shaped mesh of \d\.\d+ kB: not enough"):
             rest.reshape(moved)
         assert gl_objects() == before
         rest.reshape(moved)

@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.phrases import file_size
 from viewer.rendering.gpu.context import storage_limit
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -75,7 +76,7 @@ class PosedVertices:
         self._free_own()
         self._shared, self.centers = shared, np.zeros((0, 3))
         if shared is None:
-            what = f"posed vertices of {room * self.size / 1e6:.1f} MB"
+            what = f"posed vertices of {file_size(room * self.size)}"
             self._own = checked(self.context, self.context.buffer(reserve=room * self.size), what)
         self.centers = np.tile(self.mesh.center, (room, 1))
         self._free_textures()
@@ -232,7 +233,7 @@ class SharedVertices:
         """Make room for the vertices of one group, in bytes."""
         if self.buffer is None or self.buffer.size < size:
             self.release()
-            what = f"posed vertices of {size / 1e6:.1f} MB"
+            what = f"posed vertices of {file_size(size)}"
             self.buffer = checked(self.context, self.context.buffer(reserve=size), what)
 
     def release(self) -> None:

@@ -16,7 +16,7 @@ import moderngl
 import numpy as np
 
 from viewer.errors import RenderError, ViewerError
-from viewer.phrases import Remedy
+from viewer.phrases import Remedy, file_size
 from viewer.rendering.gpu.context import check_errors, gl_function
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -90,12 +90,12 @@ class Target:
         samples = f" with {self.samples} samples per pixel" if self.samples else ""
         less = "a smaller size needs less"
         if self.samples:
-            alone = _gigabytes(target_bytes(self.size, 0))
+            alone = file_size(target_bytes(self.size, 0))
             option = Remedy("Samples in Preferences", "--samples 1")
             less = f"1 sample per pixel ({option}) needs {alone}, {less}"
         return RenderError(
             f"an image of {width} x {height} pixels{samples} needs "
-            f"{_gigabytes(target_bytes(self.size, self.samples))} of graphics memory, which "
+            f"{file_size(target_bytes(self.size, self.samples))} of graphics memory, which "
             f"{self.context.info['GL_RENDERER']} does not provide; {less}"
         )
 
@@ -139,7 +139,7 @@ class Readback:
         self._free, self._begun, self._ended = (deque[moderngl.Buffer]() for _ in range(3))
         self._calls = _calls(context)
         self.is_free = self._calls is not None
-        what = f"a buffer of {self._n_bytes / 1e6:.1f} MB for frames"
+        what = f"a buffer of {file_size(self._n_bytes)} for frames"
         self._owner = Owner()
         with self._owner.guard():
             for _ in range(count):
@@ -197,7 +197,7 @@ class Readback:
             )
             self._bind(None)
             if not address:
-                doing = f"reading an image of {self._n_bytes / 1e6:.1f} MB"
+                doing = f"reading an image of {file_size(self._n_bytes)}"
                 check_errors(self._target.context, doing)
                 raise RenderError(f"{doing}: the driver provides no address")
             data = memoryview((ctypes.c_ubyte * self._n_bytes).from_address(address))
@@ -236,6 +236,23 @@ def _calls(context: moderngl.Context) -> dict[str, _Call] | None:
     return found
 
 
+class TexturePass:
+    """Pass that draws a texture over a bound target of its size, times a factor."""
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self._array = context.vertex_array(programs.drawing("fullscreen", fragment="average"), [])
+
+    def draw(self, texture: moderngl.Texture, factor: float = 1.0) -> None:
+        """Draw a texture."""
+        set_uniforms(self._array.program, {"u_texture": 0, "u_factor": factor})
+        texture.use(0)
+        self._array.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free the vertex array."""
+        self._array.release()
+
+
 class Accumulation:
     """Sum of ``count`` passes of one image, in floating point, and their average."""
 
@@ -249,8 +266,7 @@ class Accumulation:
         with self._owner.guard():
             self._sum = keep(checked(context, context.texture(size, 4, dtype="f4"), what))
             self._framebuffer = keep(context.framebuffer([self._sum]))
-            program = programs.drawing("fullscreen", fragment="average")
-            self._array = keep(context.vertex_array(program, []))
+            self._pass = keep(TexturePass(context, programs))
 
     def clear(self) -> None:
         """Begin a new sum."""
@@ -264,7 +280,7 @@ class Accumulation:
         self.context.viewport = (0, 0, *self.size)
         self.context.enable_only(moderngl.BLEND)
         self.context.blend_func = moderngl.ONE, moderngl.ONE
-        self._draw(texture, 1.0)
+        self._pass.draw(texture)
         self.count += 1
 
     def show(self, target: Target) -> None:
@@ -272,12 +288,7 @@ class Accumulation:
         target.framebuffer.use()
         self.context.viewport = (0, 0, *self.size)
         self.context.enable_only(moderngl.NOTHING)
-        self._draw(self._sum, 1.0 / max(self.count, 1))
-
-    def _draw(self, texture: moderngl.Texture, factor: float) -> None:
-        set_uniforms(self._array.program, {"u_texture": 0, "u_factor": factor})
-        texture.use(0)
-        self._array.render(moderngl.TRIANGLES, vertices=3)
+        self._pass.draw(self._sum, 1.0 / max(self.count, 1))
 
     def release(self) -> None:
         """Free the sum."""
@@ -320,7 +331,3 @@ def make_straight(pixels: Bytes) -> None:
     if partial.any():
         colors = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
         pixels[partial, :3] = np.minimum(np.rint(colors), 255.0)
-
-
-def _gigabytes(count: int) -> str:
-    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"

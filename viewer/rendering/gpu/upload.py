@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewer.errors import RenderError
+from viewer.phrases import file_size
 from viewer.rendering.gpu.context import check_errors, gl_function, is_software
 from viewer.rigs.arrays import Bytes, Floats
 from viewer.rigs.srgb import decode_srgb, encode_srgb
@@ -32,13 +33,13 @@ _MOST_LIGHT = (1 << 14) - 1  # the sum of four texels fits into 16 bits
 def buffer(context: moderngl.Context, values: ArrayLike, dtype: str) -> moderngl.Buffer:
     """Return a vertex or index buffer; one byte long if it is empty."""
     data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
-    return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
+    return checked(context, context.buffer(data), f"a mesh buffer of {file_size(len(data))}")
 
 
 def reserved(context: moderngl.Context, size: int, what: str) -> moderngl.Buffer:
     """Return a buffer of ``size`` bytes that is written often; ``what`` names it in errors."""
     made = context.buffer(reserve=max(size, 1), dynamic=True)
-    return checked(context, made, f"{what} of {size / 1e6:.1f} MB")
+    return checked(context, made, f"{what} of {file_size(size)}")
 
 
 def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:

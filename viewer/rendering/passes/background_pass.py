@@ -13,7 +13,7 @@ from viewer.rendering.gpu.draw_state import without_colors, without_depth_test
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS, Studio
-from viewer.rendering.gpu.target import Target
+from viewer.rendering.gpu.target import Target, TexturePass
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.options import BACKGROUNDS, Lights, parse_color
 from viewer.rendering.view import View, set_lights
@@ -97,8 +97,7 @@ class _Picture:
             what = f"a background of {size[0]} x {size[1]} pixels"
             self._texture = keep(checked(context, context.texture(size, 4), what))
             self.framebuffer = keep(context.framebuffer([self._texture]))
-            program = programs.drawing("fullscreen", fragment="average")
-            self._array = keep(context.vertex_array(program, []))
+            self._pass = keep(TexturePass(context, programs))
 
     def copy_to(self, target: Target) -> None:
         """Replace the colours of a bound target of the same size."""
@@ -106,9 +105,7 @@ class _Picture:
             self.context.copy_framebuffer(target.framebuffer, self.framebuffer)
             return
         # With several samples per pixel, drawing is faster than copying on software drivers.
-        set_uniforms(self._array.program, {"u_texture": 0, "u_factor": 1.0})
-        self._texture.use(0)
-        self._array.render(moderngl.TRIANGLES, vertices=3)
+        self._pass.draw(self._texture)
 
     def release(self) -> None:
         """Free everything."""
