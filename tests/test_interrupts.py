@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+from itertools import cycle, product
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,15 @@ OLD = b"the old file"
 INT, TERM = signal.SIGINT, signal.SIGTERM
 ENDINGS = {INT: (130, b"viewer: interrupted\n"), TERM: (143, b"viewer: terminated\n")}
 BOTH = pytest.mark.parametrize("number", [INT, TERM], ids=["int", "term"])
+
+
+def in_turn(*factors):
+    """Return all combinations, the first with SIGINT, the second with SIGTERM, and so on.
+
+    Only the message and the exit code depend on the signal.
+    """
+    return [(number, *case) for number, case in zip(cycle((INT, TERM)), product(*factors))]
+
 
 # The program of a child process. ``strike()`` signals it once, at a moment that the test's lines
 # choose.
@@ -163,9 +173,10 @@ def test_signal_before_the_first_import_is_not_lost(end, number, ending, module)
     assert end(moment, number, *command, **places, imports=True) == (*ending, OLD)
 
 
-@BOTH
-@pytest.mark.parametrize("helper", ["make_attribute", "make_uniform", "make_varying"])
-@pytest.mark.parametrize("kind", [PNG, MP4], ids=["png", "mp4"])
+@pytest.mark.parametrize(
+    ("number", "kind", "helper"),
+    in_turn([PNG, MP4], ["make_attribute", "make_uniform", "make_varying"]),
+)
 def test_signal_while_moderngl_calls_python_does_not_crash(end, number, helper, kind):
     command, places = kind
     moment = f"import _moderngl\nbefore(_moderngl, {helper!r})"
@@ -197,10 +208,9 @@ def test_interrupted_video_keeps_the_old_file(end, number, moment):
     assert end(moment, number, *command, **places) == (*ENDINGS[number], OLD)
 
 
-@BOTH
 @pytest.mark.parametrize(
-    ("kind", "moment"),
-    [
+    ("number", "case"),
+    in_turn([
         (INFO, "import viewer.formats.skin as m\nbefore(m, 'read')"),
         (INFO, "import viewer.commands._scene as m\nafter(m, 'begin')"),
         ((("lint",), {}), "import viewer.commands.lint as m\nbefore(m, 'lint_files')"),
@@ -208,10 +218,10 @@ def test_interrupted_video_keeps_the_old_file(end, number, moment):
         (PNG, "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"),
         (PNG, "import os\nbefore(os, 'fsync')"),
         (OBJ, "import tempfile\nbefore(tempfile, 'mkstemp')"),
-    ],
-)
-def test_interrupted_command_keeps_the_old_file(end, number, kind, moment):
-    command, places = kind
+    ]),
+)  # fmt: skip
+def test_interrupted_command_keeps_the_old_file(end, number, case):
+    (command, places), moment = case
     output = OLD if places else b""
     assert end(moment, number, *command, **places) == (*ENDINGS[number], output)
 
@@ -231,9 +241,7 @@ LATE = {
 }
 
 
-@BOTH
-@pytest.mark.parametrize("moment", LATE)
-@pytest.mark.parametrize("kind", [PNG, MP4, OBJ], ids=["png", "mp4", "ply"])
+@pytest.mark.parametrize(("number", "moment", "kind"), in_turn(LATE, [PNG, MP4, OBJ]))
 def test_signal_after_the_work_is_done_is_ignored(end, number, moment, kind, tmp_path):
     command, places = kind
     lines = LATE[moment].replace("{number}", str(int(number)))
