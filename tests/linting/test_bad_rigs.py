@@ -275,6 +275,33 @@ def stuck_out() -> Figure:
     return replace(body(), mesh=replace(mesh, positions=points))
 
 
+def taken(name: str = "left_knee", by: str = "right_knee") -> Figure:
+    """Return the body with all weights of one joint at another."""
+    weights = table().copy()
+    weights[:, joint(by)] += weights[:, joint(name)]
+    weights[:, joint(name)] = 0.0
+    return weighted(weights)
+
+
+def feet_swapped() -> Figure:
+    """Return the body with exchanged weights of the feet, which are 40 mm beside the middle."""
+    figure, weights = body(), table().copy()
+    feet = [np.flatnonzero(below(f"{side}_ankle")) for side in ("left", "right")]
+    points, binds = figure.mesh.positions.copy(), figure.skin.inverse_bind.copy()
+    for side, own in zip((1.0, -1.0), feet, strict=True):
+        ankle = rest_joints(figure)[own[0], 0]
+        by = side * 0.04 - ankle
+        points[:, 0] += by * weights[:, own].sum(axis=1)
+        binds[own] = binds[own] @ translation_matrix([-by, 0.0, 0.0])
+    weights[:, np.concatenate(feet)] = weights[:, np.concatenate(feet[::-1])]
+    near = replace(
+        figure,
+        mesh=replace(figure.mesh, positions=points),
+        skin=replace(figure.skin, inverse_bind=binds),
+    )
+    return weighted(weights, near)
+
+
 CHECKED = {
     ("W011", "W012", "W013"): stray_weights,
     ("W014", "W015"): blending,
@@ -293,6 +320,11 @@ FAULTS = {
     "legs swapped": (
         swapped, "W013.swapped", [f"{s}_{j}" for s in ("left", "right") for j in LEG], []
     ),
+    "feet swapped": (
+        feet_swapped, "W013.swapped",
+        [f"{s}_{j}" for s in ("left", "right") for j in ("ankle", "foot")], [],
+    ),
+    "knee moved by the other": (taken, "W012.taken", ["left_knee"], None),
     "hard everywhere": (hard, "W015.everywhere", [], None),
     "hard elbow": (hard_elbow, "W015.border", ["left_shoulder", "left_elbow"], None),
     "mostly hard elbow": (
@@ -338,6 +370,24 @@ def test_fault_is_found_at_its_joints_and_vertices(name):
     if vertices == "head":
         vertices = np.flatnonzero(table()[:, joint("head")] > 0.5).tolist()
     assert vertices is None or sorted(found.vertices.tolist()) == vertices
+
+
+def test_joints_without_sides_in_their_names_are_compared_by_place():
+    names = tuple(f"bone_{number:03d}" for number in range(body().skeleton.n_joints))
+
+    def nameless(figure: Figure) -> Figure:
+        return replace(figure, skeleton=replace(figure.skeleton, names=names))
+
+    assert linted(nameless(body())) == []
+    (found,) = linted(nameless(lopsided()), (symmetry,))
+    (named,) = linted(lopsided(), (symmetry,))
+    assert found.diagnostic.key == named.diagnostic.key == "Y002.joints"
+    assert found.joints.tolist() == named.joints.tolist()
+
+
+def test_joint_without_weights_beside_another_limb_is_a_helper():
+    """A hand without weights moves with the arm."""
+    assert linted(taken("left_wrist", "left_elbow"), (stray_weights,)) == []
 
 
 def test_hands_of_crossed_arms_have_the_right_names():
@@ -464,8 +514,11 @@ def test_equal_weights_along_most_of_a_limb_are_found_where_they_lose_less():
     """Equal weights at |x| < 0.55: (1.1 * 50 + 0.9 * 33) / 2, 42 % of the volume are lost."""
     x = np.array([-1.0, -0.55, -0.549, 0.549, 0.55, 1.0])
     w = np.array([0.0, 0.5, 0.5, 0.5, 0.5, 1.0])
-    (found,) = linted(tube(lambda at: np.interp(at, x, w)), (volumes,))
-    assert found.diagnostic.key == "W017.equal" and found.joints.tolist() == [2]
+    figure = tube(lambda at: np.interp(at, x, w))
+    skeleton = replace(figure.skeleton, names=("bone_1", "bone_2", "bone_3", "bone_4"))
+    for one in (figure, replace(figure, skeleton=skeleton)):
+        (found,) = linted(one, (volumes,))
+        assert found.diagnostic.key == "W017.equal" and found.joints.tolist() == [2]
     # Rings are 0.05 apart: from -0.55 to 0.55, 23 of 12 vertices.
     assert len(found.vertices) == 23 * 12
 

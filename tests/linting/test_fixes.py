@@ -17,6 +17,7 @@ from linting.test_bad_rigs import (
     stuck_out,
     swapped,
     table,
+    taken,
     turned,
 )
 
@@ -109,6 +110,13 @@ def test_stray_weight_goes_to_the_joints_of_its_surroundings(amount):
     others = np.arange(len(found)) != NOSE
     np.testing.assert_allclose(found[others], table()[others], atol=1e-12)
     assert "weights of 1 vertex" in note
+
+
+def test_taken_weights_go_back():
+    # Weights below 0.01 are not seen.
+    figure, note = fixed(taken(), stray_weights)
+    np.testing.assert_allclose(weights_of(figure), table(), atol=0.01)
+    assert "W012 fixed" in note
 
 
 def test_exchanged_legs_are_exchanged_back():

@@ -15,8 +15,10 @@ from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.retargeting.joint_names import sided_words
 from viewer.rigs.retargeting.mirror import word_partners
 from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skin import bind_positions
 
 _EXACT = 1e-4  # maximum distance of a vertex from the image of its counterpart, of the size
+_PLACE = 1e-3  # the same of a joint
 _SYMMETRIC = 0.5  # minimum fraction of vertices with a counterpart in a symmetric mesh
 _mirrors: Memo[Figure, Mirror | None] = Memo()
 
@@ -34,7 +36,8 @@ class Mirror:
     known: Bools
     """(V,): vertices that have one and are the first at their position."""
     joints: Ints
-    """(J,): counterpart of each joint by name; -1 if it has a side, but no counterpart."""
+    """(J,): counterpart of each joint by name; -1 if it has a side, but no counterpart. By place if
+    no name has a side."""
 
 
 def mirror_of(figure: Figure) -> Mirror | None:
@@ -72,7 +75,24 @@ def _mirror(figure: Figure) -> Mirror | None:
     vertices[firsts[paired]] = firsts[found[paired]]
     known[firsts[paired]] = True
     joints = name_partners(figure.require_skeleton())
+    if (joints == np.arange(len(joints))).all():
+        joints = _partners_by_place(figure, axis, centre, _PLACE * size)
     return Mirror(axis, centre, vertices, known, joints)
+
+
+def _partners_by_place(figure: Figure, axis: int, centre: float, tolerance: float) -> Ints:
+    """Return the joint at the image of each joint, below the counterpart of its parent (J,)."""
+    places, parents = bind_positions(figure.require_skin()), figure.require_skeleton().parents
+    found = _counterparts(places, axis, centre, tolerance)
+    # Of several joints at one place, it is unknown which is whose counterpart.
+    partners = np.where(found >= 0, found, np.arange(len(found)))
+    for joint, parent in enumerate(parents.tolist()):
+        is_shared = (np.linalg.norm(places - places[joint], axis=1) < tolerance).sum() > 1
+        is_elsewhere = parent >= 0 and partners[parent] != parents[partners[joint]]
+        if is_shared or is_elsewhere:
+            partners[joint] = joint
+    mutual = partners[partners] == np.arange(len(partners))
+    return np.where(mutual, partners, np.arange(len(partners))).astype(np.int32)
 
 
 def _counterparts(points: Floats, axis: int, centre: float, tolerance: float) -> Indices:

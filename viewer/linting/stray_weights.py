@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
+from viewer.linting._mirror import name_partners
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import (
     FEWEST,
@@ -22,6 +24,7 @@ from viewer.phrases import agree, counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import components
+from viewer.rigs.hierarchy import descendants, with_ancestors
 from viewer.rigs.inspection.faults import distinct
 from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.skin import bind_positions
@@ -48,6 +51,23 @@ _ELSEWHERE = 20  # minimum number of the joint's other places
 _NEAR = 0.02  # distance from the bones within which all parts are near
 _OTHER_LIMB = 0.03  # minimum distance of a joint from the middle of what it moves by mistake
 _NEARER = 0.35  # maximum distance from the bones of the right joint, relative to the wrong one
+# Of a pair of joints, the middle of what one moves is beside it. Counted from the one (-0.5) to the
+# other (0.5), the middles of both are at least here, on the wrong sides, if they are exchanged.
+_ACROSS = 0.25
+_PAIR = 0.02  # minimum distance of such a pair
+_TAKEN = 8  # minimum number of vertices around a joint without weights that another one moves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """Vertices around one joint that a distant one moves."""
+
+    joint: int
+    """The joint, which has no weights."""
+    taker: int
+    """The one that moves the vertices, and others around itself."""
+    rows: Indices
+    """Rows of its influences in ``found``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +80,8 @@ class _Misplaced:
     strays: Indices
     islands: Indices
     """Rows of ``found``: of single vertices, and of whole parts of the mesh."""
+    taken: tuple[Taken, ...]
+    """Vertices around joints that move nothing."""
     swapped: Indices
     """(P, 2): joints, each with the one whose vertices it moves, and which moves its own."""
 
@@ -72,6 +94,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     figure, found = subject.actor.figure, misplaced.found
     if len(misplaced.swapped):
         yield _swapped_finding(subject, figure, misplaced.swapped[:, 0])
+    yield from _taken_findings(subject, figure, misplaced)
     yield from _islands(subject, figure, found, misplaced.islands, misplaced.distances)
     yield from _strays(subject, figure, found, misplaced.strays, misplaced.distances)
 
@@ -89,8 +112,10 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
         return None
     places, parents = bind_positions(figure.skin), figure.require_skeleton().parents
     points = figure.mesh.positions[found.vertices]
-    swapped = _swapped(found, points, places, parents, size)
+    pairs = name_partners(figure.require_skeleton())
+    swapped = _swapped(found, points, places, parents, pairs, size)
     distances = bone_distances(places, parents, points, found.joints) / size
+    taken = _taken(found, points, places, parents, distances, size)
     largest, reach = np.zeros((2, figure.skin.n_joints))
     np.maximum.at(largest, found.joints, found.weights)
     mostly = found.weights >= _MOSTLY * largest[found.joints]
@@ -113,9 +138,34 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
     stray |= _are_everywhere(found, len(np.unique(surface.place)))
     stray |= _are_alone(found, surface, place_parts, parents) & is_minor & (distances > _NEAR)
     stray &= ~np.isin(found.joints, swapped[:, 0]) & ~_are_adjacent(found, parents)
+    for one in taken:
+        stray[one.rows] = False
     whole = stray & _are_islands(surface, found, parts) if stray.any() else stray
     strays, islands = np.flatnonzero(stray & ~whole), np.flatnonzero(whole)
-    return _Misplaced(found, distances, strays, islands, swapped)
+    return _Misplaced(found, distances, strays, islands, taken, swapped)
+
+
+def _taken(
+    found: Support, points: Floats, places: Floats, parents: Ints, distances: Floats, size: float
+) -> tuple[Taken, ...]:
+    """Return what is moved around joints without weights by joints of another limb."""
+    result = []
+    used = np.zeros(len(parents), dtype=np.bool_)
+    used[found.joints] = True
+    # Controls and helpers are below others without weights.
+    for joint in np.flatnonzero(~used & (parents >= 0) & used[parents]).tolist():
+        near = bone_distances(places, parents, points, np.full(len(points), joint)) / size
+        rows = np.flatnonzero((distances > _OTHER_LIMB) & (near < _NEARER * distances))
+        # Hands without weights of their own move with the arm, and fingers with the hand.
+        above, below = with_ancestors(parents.tolist(), [joint]), descendants(parents, joint)
+        rows = rows[~np.isin(found.joints[rows], [*above]) & ~below[found.joints[rows]]]
+        if len(rows) == 0:
+            continue
+        taker = int(np.bincount(found.joints[rows], found.weights[rows]).argmax())
+        if (found.weights[rows[found.joints[rows] == taker]] > _MOSTLY).sum() >= _TAKEN:
+            every = np.flatnonzero((found.joints == taker) & (near < distances))
+            result.append(Taken(joint, taker, every))
+    return tuple(result)
 
 
 def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
@@ -221,6 +271,30 @@ def _are_islands(surface: Surface, found: Support, parts: Indices) -> Bools:
     return result
 
 
+def _taken_findings(subject: Subject, figure: Figure, misplaced: _Misplaced) -> Iterator[Finding]:
+    if not misplaced.taken:
+        return
+    labels, found = joint_labels(figure.require_skeleton()), misplaced.found
+    rows = np.concatenate([one.rows for one in misplaced.taken])
+    vertices = distinct(found.vertices[rows])
+    names = [
+        Phrase("{joint} (by {other})", joint=labels[one.joint], other=labels[one.taker])
+        for one in misplaced.taken
+    ]
+    yield subject.found(
+        "W012.taken: {n} around {them} without weights {are} moved by another limb: {names}, up to "
+        "{distance} away",
+        n=counted(len(vertices), "vertex"),
+        them=agree(len(misplaced.taken), "a joint", "joints"),
+        are=agree(len(vertices), "is", "are"),
+        names=listed(names),
+        distance=subject.length(float(misplaced.distances[rows].max() * subject.size())),
+        vertices=vertices,
+        joints=[one.joint for one in misplaced.taken],
+        at=("weights", int(vertices[0])),
+    )
+
+
 def _islands(
     subject: Subject, figure: Figure, found: Support, rows: Indices, distances: Floats
 ) -> Iterator[Finding]:
@@ -270,7 +344,9 @@ def _strays(
     )
 
 
-def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size: float) -> Indices:
+def _swapped(
+    found: Support, points: Floats, places: Floats, parents: Ints, partners: Ints, size: float
+) -> Indices:
     """Return joints, each with one that moves the vertices around it, and conversely: (N, 2)."""
     count = len(places)
     total = np.bincount(found.joints, found.weights, minlength=count)
@@ -290,8 +366,23 @@ def _swapped(found: Support, points: Floats, places: Floats, parents: Ints, size
     # Of several joints there, the pair is the nearest one.
     near = [int(across[one][second[first == one]].argmin()) for one in np.unique(first)]
     pairs = {one: second[first == one][k] for one, k in zip(np.unique(first), near, strict=True)}
-    mutual = [(one, other) for one, other in pairs.items() if pairs.get(other) == one]
-    return used[np.array(mutual, dtype=np.int64).reshape(-1, 2)]
+    mutual = {(one, other) for one, other in pairs.items() if pairs.get(other) == one}
+    # Feet that are close together may be nearer to the middle of the right one than that is far.
+    index = {int(joint): row for row, joint in enumerate(used)}
+    for left, right in enumerate(partners.tolist()):
+        if left == right or left not in index or right not in index:
+            continue
+        pair, along = (index[left], index[right]), places[right] - places[left]
+        is_apart = float(np.linalg.norm(along)) > _PAIR * size
+        if is_apart and _wrong_side(middles[pair[0]], places[left], along) > _ACROSS:
+            back = _wrong_side(middles[pair[1]], places[right], -along)
+            mutual |= {pair} if back > _ACROSS else set()
+    return used[np.array(sorted(mutual), dtype=np.int64).reshape(-1, 2)]
+
+
+def _wrong_side(middle: Floats, start: Floats, along: Floats) -> float:
+    """Return where a point is along a line: -0.5 at its start, 0.5 at its end."""
+    return float((middle - start) @ along / (along @ along)) - 0.5
 
 
 def _swapped_finding(subject: Subject, figure: Figure, joints: Indices) -> Finding:

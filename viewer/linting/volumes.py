@@ -37,7 +37,7 @@ _BOTH = 0.9, 0.5  # minimum sums of both weights: where they are equal, and wher
 
 
 def check(subject: Subject) -> Iterator[Finding]:
-    """Check elbows, wrists, knees and ankles."""
+    """Check elbows, wrists, knees and ankles in a twist, and all joints for equal weights."""
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None or not figure.is_attached:
         return
@@ -52,15 +52,18 @@ def check(subject: Subject) -> Iterator[Finding]:
     equal: dict[int, Indices] = {}
     for joint, meaning in enumerate(joint_meanings(skeleton)):
         parent = int(skeleton.parents[joint])
-        if parent >= 0 and meaning.endswith(_LIMBS):
+        if parent < 0:
+            continue
+        halves = _equal(figure.mesh, whole, joint, parent)
+        if len(halves):
+            equal[joint] = halves
+        if meaning.endswith(_LIMBS):
             axis = places[joint] - places[parent]
             fraction, vertices = _twisted(figure, whole, joint, places[joint], axis)
-            halves = _equal(figure.mesh, whole, joint, parent)
             if fraction > _LOST:
+                equal.pop(joint, None)
                 lost.append((fraction, joint))
                 blending.append(vertices)
-            elif len(halves):
-                equal[joint] = halves
     labels = joint_labels(skeleton)
     if equal:
         vertices = np.concatenate([*equal.values()])

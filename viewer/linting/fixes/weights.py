@@ -88,6 +88,13 @@ def _repaired(subject: Subject, skin: Skin, finding: Finding) -> Skin | None:
         other = np.arange(skin.n_joints)
         other[misplaced.swapped[:, 0]] = misplaced.swapped[:, 1]
         return replace(skin, joints=other[skin.joints].astype(np.int32))
+    if finding.diagnostic.key == "W012.taken":
+        joints = skin.joints.astype(np.int64)
+        keys = owners(skin).astype(np.int64) * skin.n_joints + joints
+        for one in misplaced.taken:
+            taken = misplaced.found.vertices[one.rows] * skin.n_joints + one.taker
+            joints[np.isin(keys, taken)] = one.joint
+        return replace(skin, joints=joints.astype(np.int32))
     if code == "W012":
         return _from_nearest(subject, skin, np.unique(misplaced.found.vertices[misplaced.islands]))
     # Stray weights are removed; what is left is normalised.

@@ -107,9 +107,15 @@ _BIPED_FINGER = re.compile(r"finger([0-4])([12]?)")
 _SIDES = {
     **dict.fromkeys(("l", "left", "lft", "lt", "links", "hidari", "左"), "left"),
     **dict.fromkeys(("r", "right", "rgt", "rt", "rechts", "migi", "右"), "right"),
+    # French, Spanish and Italian
+    **dict.fromkeys(("gauche", "izq", "izquierda", "izquierdo", "sx"), "left"),
+    **dict.fromkeys(("droite", "der", "derecha", "derecho", "dx"), "right"),
 }
-_PAIRS = (("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("links", "rechts"),
-          ("hidari", "migi"))  # fmt: skip
+_PAIRS = (
+    *(("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi")),
+    *(("links", "rechts"), ("gauche", "droite"), ("izq", "der"), ("sx", "dx")),
+    *(("izquierda", "derecha"), ("izquierdo", "derecho")),
+)
 _OTHER_SIDES = dict([*_PAIRS, ("左", "右"), *((b, a) for a, b in _PAIRS), ("右", "左")])
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
