@@ -14,9 +14,9 @@ from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.contacts import (
     foot_contacts,
-    ground_velocity,
     half_window,
     mean_speeds,
+    moving_ground,
     on_moving_ground,
     slowest_points,
 )
@@ -256,12 +256,13 @@ def _slipped(
     step = float(track.times[1] - track.times[0])
     paths = list(track.paths)
     how = runs_of(track.present), 1.0 / step, track.body, axis_vector(subject.up)
-    velocity = ground_velocity(paths, *how)
-    if velocity is not None:  # a motion in place: standing feet move with the ground
-        paths = on_moving_ground(paths, (track.times[0] - track.times)[:, None] * velocity)
+    ground = moving_ground(paths, *how)
+    if ground is not None:  # a motion in place: standing feet move with the ground
+        paths = on_moving_ground(paths, (track.times[0] - track.times)[:, None] * ground.velocity)
+    slips = 1.0 if ground is None else ground.slips
     speeds = np.stack([slowest_points(path, *how) for path in paths], axis=1)
     stands = np.zeros(speeds.shape, dtype=np.bool_)
-    for foot, contacts in enumerate(foot_contacts(paths, *how)):
+    for foot, contacts in enumerate(foot_contacts(paths, *how, slips=slips)):
         for contact in contacts:
             stands[contact.start : contact.stop, foot] = True
     touches = (np.abs(heights) < limits.TOUCHES * track.body) & track.present[:, None]

@@ -9,7 +9,7 @@ from rigs.retargeting.rest_twins import Y, Z
 import viewer
 from viewer.loading import bundled_body
 from viewer.rigs.feet import limits
-from viewer.rigs.feet.contacts import FootPath, foot_contacts
+from viewer.rigs.feet.contacts import FootPath, foot_contacts, moving_ground
 from viewer.rigs.feet.curves import smooth_curves
 from viewer.rigs.feet.soles import extent, soles_of
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
@@ -51,6 +51,32 @@ def test_feet_of_captures_may_slide_but_not_rise(slips):
 
 def test_contacts_end_at_gaps_and_last_at_least_a_tenth_of_a_second():
     assert contacts(moving(0.0), [(0, 10), (11, 13), (14, COUNT)]) == [(0, 10), (14, COUNT)]
+
+
+def steps(speeds: np.ndarray, is_down: np.ndarray) -> FootPath:
+    """Return a foot that moves along z by speeds (N,), on the ground or 0.1 above it."""
+    path = np.cumsum(speeds)[:, None] / RATE * Z + np.where(is_down, 0.0, 0.1)[:, None] * Y
+    return FootPath(path, path, np.tile(0.5 * Y, (len(path), 1)))
+
+
+def test_ground_of_a_cycle_is_found_although_feet_move_unevenly():
+    # Two feet alternate; they begin a step at 1.4 and end it at 0.6 body sizes per second, and move
+    # at 0.9 to 1.1 for a third of it.
+    phase = np.arange(120) % 30 / 30.0
+    x = 4.0 * phase - 1.0
+    speeds = np.where(phase < 0.5, -1.0 + 0.4 * np.sign(x) * np.abs(x) ** 1.3, 1.0)
+    other = np.roll(speeds, 15)
+    feet = [steps(speeds, phase < 0.5), steps(other, np.roll(phase < 0.5, 15))]
+    found = moving_ground(feet, [(0, 120)], RATE, 1.0, Y)
+    assert_allclose(found.velocity, -1.0 * Z, atol=0.1)
+    assert 1.0 < found.slips <= 2.0
+
+
+def test_ground_rests_if_only_one_foot_moves():
+    # As in a blow: the front foot is pushed ahead on the ground, the other one stands on its toes.
+    blow = np.where(np.arange(COUNT) < 45, 0.3, -0.9)
+    feet = [steps(blow, np.ones(COUNT, bool)), steps(np.zeros(COUNT), np.zeros(COUNT, bool))]
+    assert moving_ground(feet, [(0, COUNT)], RATE, 1.0, Y) is None
 
 
 HEIGHT = np.array([0.0, 1.0, 0.0, 0.0])

@@ -228,58 +228,75 @@ def slowest_points(
 # in the axes of the moving ground.
 
 _MOST = 500  # maximum number of candidates
+# Percentage of the rows of standing feet that deviate less from the ground than its unevenness. The
+# rows beyond are those in which a foot lands or leaves.
+_UNEVEN = 75.0
 
 
-def ground_velocity(
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingGround:
+    """Ground that moves below a body in place."""
+
+    velocity: Floats
+    """(3,). Per second."""
+    slips: float
+    """As of ``foot_contacts``, 1 to 2: how unevenly standing feet move with it."""
+
+
+def moving_ground(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
-) -> Floats | None:
-    """Return the velocity (3,) of a moving ground per second; None if it does not move."""
+) -> MovingGround | None:
+    """Return the ground that moves below a body in place; None if it does not move."""
     # The velocity that most rows of the lowest foot share, within GROUND_SAME: every one of up to
     # 500 rows is a candidate, the one with most neighbours wins, and the median of its neighbours
     # is the estimate. A mean over all rows would be biased by the swings, in which the lowest foot
     # moves the other way.
+    lows = np.array([foot.lowest(up) for foot in feet])
+    is_low = lows < lows.min(axis=0) + limits.LOWEST * size
     for seconds in limits.GROUND_WINDOWS:
-        speeds, body = _speeds(feet, spans, rate, half_window(rate, seconds), up)
-        if not len(speeds):
+        half = half_window(rate, seconds)
+        rows = np.concatenate([np.arange(first + half, last - half) for first, last in spans])
+        rows = rows.astype(np.int32)
+        if not len(rows):
             return None
+        every = rate * np.stack([_lowest_velocities(foot, rows, half, up) for foot in feet])
+        speeds = every[lows[:, rows].argmin(axis=0), np.arange(len(rows))]
         near = limits.GROUND_SAME * size
         candidates = speeds[:: -(-len(speeds) // _MOST)]
         counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
         best = candidates[int(np.argmax(counts))]
-        is_alike = np.linalg.norm(speeds - best, axis=1) < near
-        velocity: Floats = np.median(speeds[is_alike], axis=0)
-        n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
-        speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
+        velocity = np.median(speeds[np.linalg.norm(speeds - best, axis=1) < near], axis=0)
+        speed = float(np.linalg.norm(velocity))
+        body = rate * np.mean([_velocities(foot.hip, rows, half, up) for foot in feet], axis=0)
+        drift = np.linalg.norm(body.mean(axis=0))
         is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
+        # Feet of cycles that are animated by hand move less evenly than those on a treadmill.
+        most = max(near, limits.GROUND_ALIKE * speed)
+        away = np.linalg.norm(speeds - velocity, axis=1)
+        is_alike = away < most
+        n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
         is_usual = is_alike.mean() > limits.GROUND_USUAL
         is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
+        # People step with both feet, and deliver a blow with one.
+        steps = (np.linalg.norm(every - velocity, axis=2) < most) & is_low[:, rows]
+        of_other = np.sort(steps.sum(axis=1))[-2:].min()
+        is_usual &= of_other > limits.GROUND_OTHER_FOOT * is_alike.sum()
         if is_moving and is_usual:
-            return velocity
+            uneven = float(np.percentile(away[is_alike], _UNEVEN)) / near
+            return MovingGround(velocity, 1.0 + min(uneven, 1.0))
     return None
 
 
-def _speeds(
-    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, half: int, up: Floats
-) -> tuple[Floats, Floats]:
-    """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
-    lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
-    found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for first, last in spans:
-        rows = np.arange(first + half, last - half, dtype=np.int32)
-        own = np.zeros((len(rows), 3))
-        for number, foot in enumerate(feet):
-            is_toe = (foot.toe @ up <= foot.heel @ up)[rows, None]
-            moved = np.where(is_toe, *(_velocities(p, rows, half) for p in (foot.toe, foot.heel)))
-            own = np.where((lowest[rows] == number)[:, None], moved, own)
-        found.append(own)
-        body.append(np.mean([_velocities(foot.hip, rows, half) for foot in feet], axis=0))
+def _lowest_velocities(foot: FootPath, rows: Ints, half: int, up: Floats) -> Floats:
+    """Return the displacements (M, 3) per row, along the ground, of the lower point of a foot."""
+    is_toe = (foot.toe @ up <= foot.heel @ up)[rows, None]
+    return np.where(is_toe, *(_velocities(each, rows, half, up) for each in (foot.toe, foot.heel)))
+
+
+def _velocities(path: Floats, rows: Ints, half: int, up: Floats) -> Floats:
+    """Return the displacement per row around each row, along the ground."""
     across = np.eye(3) - np.outer(up, up)  # removes the vertical component
-    return rate * np.concatenate(found) @ across, rate * np.concatenate(body) @ across
-
-
-def _velocities(path: Floats, rows: Ints, half: int) -> Floats:
-    """Return the displacement per row around each row."""
-    return (path[rows + half] - path[rows - half]) / (2.0 * half)
+    return (path[rows + half] - path[rows - half]) / (2.0 * half) @ across
 
 
 def on_moving_ground(feet: Sequence[FootPath], travel: Floats) -> list[FootPath]:

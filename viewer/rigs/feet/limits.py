@@ -61,9 +61,16 @@ GROUND_MOVES = 0.2
 """Minimum speed of the ground: ``FAST``, beyond which feet do not stand on ground at rest."""
 GROUND_SAME = 0.08
 """Maximum deviation of standing feet from its velocity: ``SLOW`` relative to the ground."""
+GROUND_ALIKE = 0.25
+"""Maximum deviation of a standing foot from its velocity, relative to it, in cycles that are
+animated by hand."""
+GROUND_OTHER_FOOT = 0.2
+"""Minimum number of rows in which another foot moves with it too, relative to those of the lowest
+foot: people step with both. Walks and runs of two makers have at least 0.36, blows, jumps and
+people who sit up at most 0.05."""
 BODY_DRIFTS = 0.25
 """Maximum speed of the body relative to the ground's: a person on skates moves with the feet."""
-GROUND_USUAL, GROUND_OFTENER = 0.4, 3.0
+GROUND_USUAL, GROUND_OFTENER = 0.3, 3.0
 """Minimum fraction of the rows in which the lowest foot moves with the ground (a walker's lowest
 foot stands most of the time), and the minimum ratio to the rows in which it rests instead."""
 

@@ -28,7 +28,7 @@ from viewer.rigs.feet.contacts import (
     FootPath,
     foot_contacts,
     ground_level,
-    ground_velocity,
+    moving_ground,
     on_moving_ground,
     step_height,
 )
@@ -197,18 +197,19 @@ def plant(
     feet = body.paths(worlds) if feet is None else feet
     timing = clip.timing
     how = spans_of(timing), timing.frame_rate
-    velocity = ground_velocity(feet, *how, body.size, up)
-    if velocity is not None:  # contacts and corrections are found in the axes of the ground
+    ground = moving_ground(feet, *how, body.size, up)
+    if ground is not None:  # contacts and corrections are found in the axes of the ground
         seconds = np.flatnonzero(timing.present) / timing.frame_rate
-        travel = -seconds[:, None] * velocity
+        travel = -seconds[:, None] * ground.velocity
         body = replace(body, travel=travel)
         worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
-    speed = 0.0 if velocity is None else float(np.linalg.norm(velocity))
+    speed = 0.0 if ground is None else float(np.linalg.norm(ground.velocity))
+    slips = 1.0 if ground is None else ground.slips
 
     def plan_of(ease: float) -> _FootPlan:
         if is_own:
             return _own_plan(feet, *how, body.size, up, body.heights(worlds, up), ease)
-        return _foot_plan(feet, *how, (body.size, body.clearance), up, ease)
+        return _foot_plan(feet, *how, (body.size, body.clearance), up, ease, slips)
 
     plan = plan_of(0.0)
     if not any(plan.contacts):
@@ -389,11 +390,12 @@ def _foot_plan(
     rate: float,
     shape: tuple[float, float],
     up: Floats,
-    ease: float = 0.0,
+    ease: float,
+    slips: float,
 ) -> _FootPlan:
     """Return the contacts of the source and the heights of the ground under the figure."""
     size, clearance = shape
-    contacts = foot_contacts(feet, spans, rate, size, up, ease)
+    contacts = foot_contacts(feet, spans, rate, size, up, ease, slips)
     if not any(contacts):
         return _FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
     level, is_usual = ground_level(contacts, size, clearance)
