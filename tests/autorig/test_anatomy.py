@@ -7,7 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from viewer.autorig.anatomy import Limb, LimbPair, anatomy_of, body_points, feet_ahead, plans_of
+from viewer.autorig.anatomy import (
+    Limb,
+    LimbPair,
+    anatomies_of,
+    anatomy_of,
+    body_points,
+    feet_ahead,
+    plans_of,
+)
 from viewer.autorig.solid import solid_of
 from viewer.errors import RigError
 
@@ -66,6 +74,13 @@ def person(head=0.12, ears=False):
     return mesh(*parts)
 
 
+def with_staff():
+    """Return a person with a staff 1.15 long in the left hand."""
+    positions, triangles = person()
+    staff, more = mesh(ball_chain((0.7, 0.6, 0.03, 0.03), (0.7, 1.75, 0.03, 0.03)))
+    return np.concatenate([positions, staff]), np.concatenate([triangles, len(positions) + more])
+
+
 def ear(side):
     """Return a limb 0.4 long, from the plane at a height of 1."""
     points = np.array([[0.4 * side, 1.2, 0.8], [0.0, 1.0, 0.8]])
@@ -106,19 +121,24 @@ def test_ears_as_long_as_arms_are_another_pair():
 
 
 def test_staff_in_one_hand_is_not_part_of_the_arm():
-    positions, triangles = person()
-    staff, more = mesh(ball_chain((0.7, 0.6, 0.03, 0.03), (0.7, 1.75, 0.03, 0.03)))
-    anatomy = anatomy_of(
-        np.concatenate([positions, staff]),
-        np.concatenate([triangles, len(positions) + more]),
-        UP,
-        np.array([1.0, 0, 0]),
-    )
+    anatomy = anatomy_of(*with_staff(), UP, np.array([1.0, 0, 0]))
     (plan,) = plans_of(anatomy, False, AHEAD)
     points = body_points(anatomy, plan, is_quadruped=False).positions
     # Rows 16 to 23 and 24 to 31 are the arms, from the tips: at x = 0.75 without the staff.
     for row, side in ((16, 1.0), (24, -1.0)):
         np.testing.assert_allclose(points[row], [side * 0.72, 1.0, 0.0], atol=0.08)
+
+
+def test_plane_between_front_and_back_is_not_the_only_one():
+    # The staff has a mirror image in front of the person, but none on the other side.
+    front, sides = anatomies_of(*with_staff(), UP)
+    assert front.symmetry > sides.symmetry
+    assert abs(front.lateral[2]) > 0.9 and abs(sides.lateral[0]) > 0.9
+    assert plans_of(front, False, AHEAD) == []
+    (plan,) = plans_of(sides, False, AHEAD)
+    assert plan.upper.attachment[1] == pytest.approx(1.0, abs=0.06)
+    # Symmetric figures have one.
+    assert len(anatomies_of(*person(), UP)) == 1
 
 
 def test_longer_path_of_an_arm_that_touches_the_body_is_not_cut(standing):

@@ -36,7 +36,10 @@ _ANGLES = 36  # directions of the sagittal plane that are tried, every 5 degrees
 _FINE = np.radians([-2.5, -1.25, 1.25, 2.5])  # around the best of them
 _TILTED = 0.02  # gain of symmetry for which an oblique plane is preferred to a coordinate plane
 _BOTH_WAYS = 0.01  # difference of symmetries that is within the accuracy of voxels
+# Symmetry from which a plane is certain, and the cosine of the least angle to another one.
+_SYMMETRIC, _ELSEWHERE = 0.97, np.cos(np.radians(50.0))
 _MIRRORED = 4000  # voxels that are mirrored
+_SHIFT = 4  # largest distance of the plane from the median of the voxels, in voxels
 _TRUNK_PART = 0.1  # smallest part of trunk or head in the plane, as a fraction of the largest
 
 _PROMINENT = 0.06  # shortest persistence of a limb, as a fraction of the size
@@ -141,26 +144,44 @@ def anatomy_of(
     positions: Floats, triangles: Ints, up: Floats, lateral: Floats | None = None
 ) -> Anatomy:
     """Find the anatomy of a mesh with a known up axis; ``lateral`` if it is known, too."""
-    from scipy.sparse import csgraph
+    return anatomies_of(positions, triangles, up, lateral)[0]
 
+
+def anatomies_of(
+    positions: Floats, triangles: Ints, up: Floats, lateral: Floats | None = None
+) -> list[Anatomy]:
+    """Find the anatomy of a mesh for each plane that may be the sagittal one, the best first."""
     with part_of_work(span=(0.0, 0.3)):
         solid = solid_within(positions, triangles)
     report_fraction(0.3, "anatomy")
-    lateral, offset, symmetry = sagittal_plane(solid, up, lateral)
+    planes = sagittal_planes(solid, up, lateral)
+    paths, found = Paths(solid), []
+    for number, plane in enumerate(planes):
+        span = (0.3 + 0.7 * number / len(planes), 0.3 + 0.7 * (number + 1) / len(planes))
+        with part_of_work(span=span):
+            found.append(_divided(solid, paths, up, *plane))
+    return found
+
+
+def _divided(
+    solid: Solid, paths: Paths, up: Floats, lateral: Floats, offset: float, symmetry: float
+) -> Anatomy:
+    """Find the anatomy on both sides of a plane."""
+    from scipy.sparse import csgraph
+
     centers = solid.centers(solid.voxels)
     sides = centers @ lateral - offset
-    paths = Paths(solid)
     steps = paths.steps
     middle = _middle(steps, np.abs(sides) <= 1.01 * solid.spacing)
     distances, _, sources = csgraph.dijkstra(
         steps, indices=middle, min_only=True, return_predecessors=True
     )
-    report_fraction(0.5, "anatomy")
+    report_fraction(0.3, "anatomy")
     size = float(solid.spacing * np.ptp(solid.voxels, axis=0).max())
     known = np.where(np.isfinite(distances), distances, 0.0)
     tips = LevelSets(steps, known, solid.spacing).tips(_is_limb).rows
     tips = tips[distances[tips] >= _PROMINENT * size]
-    report_fraction(0.8, "anatomy")
+    report_fraction(0.7, "anatomy")
     limbs = [
         Limb(
             centers[path],
@@ -179,6 +200,17 @@ def sagittal_plane(
     solid: Solid, up: Floats, lateral: Floats | None = None
 ) -> tuple[Floats, float, float]:
     """Return normal and offset of the vertical plane of best mirror symmetry, and the symmetry."""
+    return sagittal_planes(solid, up, lateral)[0]
+
+
+def sagittal_planes(
+    solid: Solid, up: Floats, lateral: Floats | None = None
+) -> list[tuple[Floats, float, float]]:
+    """Return normal, offset and symmetry of the vertical plane of best mirror symmetry.
+
+    Unless the solid is symmetric, also those of the best plane in another direction: front and back
+    of a person differ less than the sides if one hand holds a staff or a shield.
+    """
     from scipy import ndimage
 
     # Within one voxel, the mirror image of the boundary is inside or outside by chance.
@@ -186,7 +218,7 @@ def sagittal_plane(
     centers = solid.centers(solid.voxels)
     some = centers[:: max(1, len(centers) // _MIRRORED)]
     if lateral is not None:
-        return lateral, *_symmetry(solid, around, some, lateral)
+        return [(lateral, *_symmetry(solid, around, some, lateral))]
     # Two horizontal vectors, along coordinate axes if up is one.
     first = np.cross(up, np.eye(3)[int(np.abs(up).argmin())])
     first = first / np.linalg.norm(first)
@@ -199,23 +231,34 @@ def sagittal_plane(
 
     angles = np.arange(_ANGLES) * np.pi / _ANGLES
     found = [tried(angle) for angle in angles.tolist()]
-    best = int(np.argmax([each[0] for each in found]))
-    plain, other = sorted((found[0], found[_ANGLES // 2]), key=lambda each: -each[0])
-    # A figure that is symmetric both ways, as without feet, is wider from side to side.
-    if other[0] >= plain[0] - _BOTH_WAYS and other[1] > plain[1]:
-        plain = other
-    if found[best][0] < plain[0] + _TILTED:
-        return plain[2], plain[3], plain[0]
-    near = [found[best], *(tried(float(angles[best] + step)) for step in _FINE)]
-    symmetry, _, normal, offset = max(near, key=lambda each: each[0])
-    return normal, offset, symmetry
+
+    def refined(rows: Ints) -> tuple[Floats, float, float]:
+        """Return the best plane at some of the angles, or between them."""
+        best = max(rows.tolist(), key=lambda row: found[row][0])
+        plains = [found[row] for row in (0, _ANGLES // 2) if row in rows]
+        plains.sort(key=lambda each: -each[0])
+        # A figure that is symmetric both ways, as without feet, is wider from side to side.
+        if len(plains) == 2 and plains[1][0] >= plains[0][0] - _BOTH_WAYS:
+            plains.sort(key=lambda each: -each[1])
+        if plains and found[best][0] < plains[0][0] + _TILTED:
+            return plains[0][2], plains[0][3], plains[0][0]
+        near = [found[best], *(tried(float(angles[best] + step)) for step in _FINE)]
+        symmetry, _, normal, offset = max(near, key=lambda each: each[0])
+        return normal, offset, symmetry
+
+    planes = [refined(np.arange(_ANGLES))]
+    normal, _, symmetry = planes[0]
+    if symmetry < _SYMMETRIC:
+        cosines = np.cos(angles) * float(normal @ first) + np.sin(angles) * float(normal @ second)
+        planes.append(refined(np.flatnonzero(np.abs(cosines) <= _ELSEWHERE)))
+    return planes
 
 
 def _symmetry(solid: Solid, around: Bools, points: Floats, normal: Floats) -> tuple[float, float]:
     """Return the offset of the best plane with this normal, and the fraction mirrored inside."""
     along = points @ normal
     # The plane halves a symmetric solid; props on one side move the halving plane a little.
-    offsets = float(np.median(along)) + solid.spacing * np.linspace(-2.0, 2.0, 9)
+    offsets = float(np.median(along)) + solid.spacing * np.linspace(-_SHIFT, _SHIFT, 4 * _SHIFT + 1)
     fractions = []
     for offset in offsets.tolist():
         arms = along - offset

@@ -1,12 +1,16 @@
 """Starts from anatomy, for templates that face any way."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from autorig.test_anatomy import with_staff
 from numpy.testing import assert_allclose
 
+from viewer.autorig.alignment import posed_alignment
 from viewer.autorig.alignment.anatomy_fit import left_of, starts_of, template_body
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings, Posed
 from viewer.autorig.anatomy import anatomy_of
 from viewer.loading import bundled_body, load
 from viewer.rigs.figure import Figure
@@ -46,3 +50,14 @@ def test_template_that_faces_another_way_is_turned_to_the_target(up):
     assert best.is_sure
     assert_allclose(best.fitted.similarity.rotation, rotation.T, atol=0.1)
     assert best.error < 0.01
+
+
+def test_plane_of_a_person_with_a_staff_is_decided_by_the_fit():
+    figure = load(bundled_body()).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    job = SimpleNamespace(template=figure, pose=pose, settings=AlignmentSettings())
+    sides = [Posed(*with_staff()), Posed(figure.mesh.positions, figure.mesh.triangles)]
+    starts, _ = posed_alignment._starts(job, sides[1], sides[0])
+    # Front and back are more alike than left and right, but have no arms.
+    assert_allclose(np.abs(starts[0].plan.left), [1.0, 0.0, 0.0], atol=0.1)
+    assert starts[0].is_sure and starts[0].is_usual and starts[0].error < 0.03

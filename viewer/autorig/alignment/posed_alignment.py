@@ -41,7 +41,7 @@ from viewer.autorig.alignment.surface_alignment import (
     misfit,
     nearly_similar,
 )
-from viewer.autorig.anatomy import LimbPair, anatomy_of
+from viewer.autorig.anatomy import LimbPair, anatomies_of
 from viewer.autorig.solid import Solid
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
@@ -255,9 +255,14 @@ def _starts(
     front = None if settings.facing is None else axis_direction(settings.facing)
     lateral = None if front is None else np.cross(up, front)
     with part_of_work(span=(0.15, 0.3)):
-        target = anatomy_of(theirs.positions, theirs.triangles, up, lateral)
-    with part_of_work(span=(0.3, 0.4)):
-        return starts_of(body, target, front, landmarks), (body.anatomy.solid, target.solid)
+        targets = anatomies_of(theirs.positions, theirs.triangles, up, lateral)
+    found = []
+    for number, target in enumerate(targets):
+        span = (0.3 + 0.1 * number / len(targets), 0.3 + 0.1 * (number + 1) / len(targets))
+        with part_of_work(span=span):
+            found += starts_of(body, target, front, landmarks)
+    solids = body.anatomy.solid, targets[0].solid
+    return sorted(found, key=lambda start: start.error), solids
 
 
 def _best(job: _Job, ours: Posed, kept: PosedAlignment, by_limbs: list[_LimbFit]) -> PosedAlignment:
