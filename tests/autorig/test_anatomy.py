@@ -14,6 +14,7 @@ from viewer.autorig.anatomy import (
     anatomy_of,
     body_points,
     feet_ahead,
+    paired,
     plans_of,
 )
 from viewer.autorig.solid import solid_of
@@ -139,6 +140,42 @@ def test_plane_between_front_and_back_is_not_the_only_one():
     assert plan.upper.attachment[1] == pytest.approx(1.0, abs=0.06)
     # Symmetric figures have one.
     assert len(anatomies_of(*person(), UP)) == 1
+
+
+def test_pair_of_a_lowered_and_a_raised_arm():
+    # Both are 0.7 long and attached at a height of 1; their tips are 1.4 apart when mirrored.
+    side = np.array([0.1, 1.0, 0.0])
+    limbs = [
+        Limb(np.array([side + 0.7 * UP, side, UP]), np.full(3, 0.05), UP, 0.8),
+        Limb(np.array([side - 0.7 * UP, side, UP]) * [-1, 1, 1], np.full(3, 0.05), UP, 0.8),
+    ]
+    given = limbs, np.array([True, False]), np.array([1.0, 0, 0]), 0.0, 1.0
+    # A quarter of 1.4 is 0.35 of the size.
+    assert paired(*given) == () and len(paired(*given, 0.36)) == 1
+
+
+def test_sides_of_a_head_are_no_arms(standing):
+    (plan,) = plans_of(standing, False, AHEAD)
+    # The half of a sphere of radius 0.5 is as long as it is thick.
+    points = np.array([[0.5, 1.5, 0], [0.0, 1.5, 0]])
+    bump = LimbPair(
+        tuple(Limb(points * [s, 1, 1], np.array([0.0, 0.5]), points[1], 0.5) for s in (1, -1))
+    )
+    assert bump.is_bump and not plan.upper.is_bump and not plan.lower.is_bump
+    (found,) = plans_of(replace(standing, pairs=(plan.lower, plan.upper, bump)), False, AHEAD)
+    assert found.upper is plan.upper
+    assert plans_of(replace(standing, pairs=(plan.lower, bump)), False, AHEAD) == []
+
+
+def test_corners_of_a_cape_are_no_legs(standing):
+    (plan,) = plans_of(standing, False, AHEAD)
+    points = np.array([[0.25, 0.1, -0.3], [0.0, 0.1, -0.3]])
+    corners = LimbPair(
+        tuple(Limb(points * [s, 1, 1], np.full(2, 0.01), points[1], 0.25) for s in (1, -1))
+    )
+    assert standing.stands(corners) and corners.attachment[1] < plan.lower.attachment[1]
+    (found,) = plans_of(replace(standing, pairs=(*standing.pairs, corners)), False, AHEAD)
+    assert found.lower is plan.lower
 
 
 def test_longer_path_of_an_arm_that_touches_the_body_is_not_cut(standing):

@@ -44,7 +44,12 @@ _TRUNK_PART = 0.1  # smallest part of trunk or head in the plane, as a fraction 
 
 _PROMINENT = 0.06  # shortest persistence of a limb, as a fraction of the size
 _OWN = 0.4  # shortest persistence of a limb, as a fraction of its length: fingers have less
-_PAIRED = 0.3  # largest difference of two limbs of a pair, as a fraction of the size
+# Length of a limb over the radius of what it is attached to. The half of a sphere has 1, sides of
+# heads 1.1 to 1.55; arms and legs, also of toys with big heads, have 1.75 to 15.
+_BUMP = 1.6
+# Largest difference of two limbs of a pair, as a fraction of the size; and that of two arms, as one
+# may be raised.
+_PAIRED, _POSED = 0.3, 0.45
 _ARM_OF_ALL = 0.3  # length of an arm over that with what it holds, such as a staff
 _PROP = 0.2  # cost of what one limb of a pair holds, over its length
 _MOST_PAIRS = 4  # longest pairs that are considered
@@ -99,6 +104,11 @@ class LimbPair:
     def attachment(self) -> Floats:
         """Mean place of attachment: (3,)."""
         return 0.5 * (self.limbs[0].attachment + self.limbs[1].attachment)
+
+    @property
+    def is_bump(self) -> bool:
+        """Whether it only bulges from the part to which it belongs, as the sides of a head."""
+        return min(limb.length / max(float(limb.radii.max()), 1e-12) for limb in self.limbs) < _BUMP
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,7 +201,7 @@ def _divided(
         )
         for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
     ]
-    pairs = paired(limbs, sides[tips] > 0.0, lateral, offset, size)[:_MOST_PAIRS]
+    pairs = paired(limbs, sides[tips] > 0.0, lateral, offset, size, _POSED)[:_MOST_PAIRS]
     report_fraction(1.0, "anatomy")
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
@@ -232,9 +242,9 @@ def sagittal_planes(
     angles = np.arange(_ANGLES) * np.pi / _ANGLES
     found = [tried(angle) for angle in angles.tolist()]
 
-    def refined(rows: Ints) -> tuple[Floats, float, float]:
+    def refined(rows: list[int]) -> tuple[Floats, float, float]:
         """Return the best plane at some of the angles, or between them."""
-        best = max(rows.tolist(), key=lambda row: found[row][0])
+        best = max(rows, key=lambda row: found[row][0])
         plains = [found[row] for row in (0, _ANGLES // 2) if row in rows]
         plains.sort(key=lambda each: -each[0])
         # A figure that is symmetric both ways, as without feet, is wider from side to side.
@@ -246,11 +256,11 @@ def sagittal_planes(
         symmetry, _, normal, offset = max(near, key=lambda each: each[0])
         return normal, offset, symmetry
 
-    planes = [refined(np.arange(_ANGLES))]
+    planes = [refined(list(range(_ANGLES)))]
     normal, _, symmetry = planes[0]
     if symmetry < _SYMMETRIC:
         cosines = np.cos(angles) * float(normal @ first) + np.sin(angles) * float(normal @ second)
-        planes.append(refined(np.flatnonzero(np.abs(cosines) <= _ELSEWHERE)))
+        planes.append(refined(np.flatnonzero(np.abs(cosines) <= _ELSEWHERE).tolist()))
     return planes
 
 
@@ -291,7 +301,12 @@ def _is_limb(found: Protrusion) -> bool:
 
 
 def paired(
-    limbs: list[Limb], positive: Bools, lateral: Floats, offset: float, size: float
+    limbs: list[Limb],
+    positive: Bools,
+    lateral: Floats,
+    offset: float,
+    size: float,
+    most: float = _PAIRED,
 ) -> tuple[LimbPair, ...]:
     """Pair the limbs of both sides, the most similar ones first; the longest pair is the first."""
     ours = [limb for limb, side in zip(limbs, positive.tolist(), strict=True) if side]
@@ -309,7 +324,7 @@ def paired(
     pairs: list[LimbPair] = []
     left, right = set(range(len(ours))), set(range(len(others)))
     for cost, i, j in sorted(costs):
-        if cost <= _PAIRED * size and i in left and j in right:
+        if cost <= most * size and i in left and j in right:
             left.remove(i)
             right.remove(j)
             pairs.append(LimbPair((ours[i], others[j])))
@@ -372,8 +387,11 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
             if front is None or float(ahead @ front) > 0.0:
                 found.append(Plan(hind, fore, left))
         return found
-    legs = min(standing or anatomy.pairs, key=lambda pair: heights[id(pair)])
-    above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair)]
+    # The corners of a cape or a coat are shorter than legs.
+    least = _AS_LONG * max((pair.length for pair in standing), default=0.0)
+    lowest = [pair for pair in standing if pair.length >= least] or anatomy.pairs
+    legs = min(lowest, key=lambda pair: heights[id(pair)])
+    above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair) and not pair.is_bump]
     longest = max((pair.length for pair in above), default=0.0)
     # Ears, horns and capes are shorter than arms, or are attached above them.
     arms = [pair for pair in above if pair.length >= _AS_LONG * longest]
