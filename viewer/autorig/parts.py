@@ -13,10 +13,10 @@ from itertools import combinations
 import numpy as np
 
 from viewer.autorig.solid import Solid
-from viewer.autorig.surface.samples import sample_surface
 from viewer.autorig.surface.welding import one_sided, stiff_islands, weld
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.topology import components
 from viewer.rigs.mesh import Mesh, triangle_areas
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.autorig.surface.samples import sample_surface
 from viewer.autorig.surface.welding import one_sided, weld
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.topology import part_volumes
 
 if TYPE_CHECKING:

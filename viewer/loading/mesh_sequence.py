@@ -34,7 +34,7 @@ from viewer.phrases import axes, counted, listed, printable, rounded
 from viewer.progress import report
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.mesh import Mesh, side_lengths, vertex_normals
 from viewer.rigs.motion.moving_mesh import MovingMesh, bind_row, room_for
 from viewer.rigs.motion.timing import DEFAULT_RATE
 
@@ -272,7 +272,7 @@ def _check_same(source: Source, mesh: Mesh, first: Mesh, path: Path) -> None:
 
 def _check_order(source: Source, mesh: Mesh, first: Mesh, path: Path) -> None:
     """Raise if the vertices of a file are probably those of the first file in another order."""
-    lengths, before = (_edge_lengths(each) for each in (mesh, first))
+    lengths, before = (side_lengths(each.positions, each.triangles) for each in (mesh, first))
     grown = np.ptp(mesh.positions, axis=0).max() / max(np.ptp(first.positions, axis=0).max(), _TINY)
     known = before > 0.0
     if not known.any():
@@ -286,13 +286,6 @@ def _check_order(source: Source, mesh: Mesh, first: Mesh, path: Path) -> None:
             first=printable(path.name, 60),
             ratio=rounded(ratio, 2),
         )
-
-
-def _edge_lengths(mesh: Mesh) -> Floats:
-    """Return the lengths of the sides of all triangles (3 T,)."""
-    corners = mesh.positions[mesh.triangles]
-    found: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel()
-    return found
 
 
 def _first_other_face(triangles: Ints, others: Ints) -> int | None:

@@ -156,10 +156,16 @@ def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
     return 0.5 * np.linalg.norm(area_vectors(positions, triangles), axis=1)
 
 
+def side_lengths(positions: Floats, triangles: Ints) -> Floats:
+    """Return the lengths of each triangle's sides, from each corner to the next: (T, 3)."""
+    corners = positions[triangles]
+    lengths: Floats = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return lengths
+
+
 def flat_triangles(mesh: Mesh) -> Bools:
     """Return which triangles have no area within float32 rounding: (T,)."""
-    corners = mesh.positions[mesh.triangles]
-    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    edges = side_lengths(mesh.positions, mesh.triangles).max(axis=1)
     areas = triangle_areas(mesh.positions, mesh.triangles)
     # The height over the longest edge; 0 for a point.
     heights = np.divide(2.0 * areas, edges, out=np.zeros_like(areas), where=edges > 0.0)

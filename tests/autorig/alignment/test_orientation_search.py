@@ -13,9 +13,9 @@ from viewer.autorig.alignment.orientation_search import (
     search,
     unit_scale,
 )
-from viewer.autorig.surface.samples import sample_surface
 from viewer.errors import RigError
 from viewer.progress import receiving
+from viewer.rigs.geometry.samples import sample_surface
 
 
 def cloud(positions, triangles):

@@ -15,9 +15,9 @@ from viewer.autorig.alignment.pose_fit import Fitted
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.surface.samples import sample_surface
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.skinning import deform, joint_matrices
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
-from viewer.autorig.surface.samples import SurfaceSamples, sample_surface, triangle_normals
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.closest_point import Surface
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.samples import SurfaceSamples, sample_surface, triangle_normals
 from viewer.rigs.geometry.topology import edges_of, welded
 from viewer.rigs.geometry.vectors import unit
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from viewer.autorig.alignment.icp import Cloud, Side, gaps_between, iterate
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.surface.samples import SurfaceSamples
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.samples import SurfaceSamples
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Allowed values of an up axis or a facing."""
@@ -160,7 +160,10 @@ def _thinned(side: Cloud, count: int) -> Cloud:
     step = max(1, len(side.samples.positions) // count)
     every = side.samples
     samples = SurfaceSamples(
-        every.positions[::step], every.normals[::step], every.triangles[::step]
+        every.positions[::step],
+        every.normals[::step],
+        every.triangles[::step],
+        every.weights[::step],
     )
     return side.with_samples(samples)
 

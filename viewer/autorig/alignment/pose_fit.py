@@ -35,7 +35,6 @@ import numpy as np
 from viewer.autorig.alignment.icp import Side
 from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
 from viewer.progress import offer, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
@@ -46,6 +45,7 @@ from viewer.rigs.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
+from viewer.rigs.geometry.samples import even_vertices
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.kinematics import skinning_matrices, world_matrices, world_rotations

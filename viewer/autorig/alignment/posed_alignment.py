@@ -43,7 +43,6 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.autorig.anatomy import LimbPair, anatomies_of
 from viewer.autorig.solid import Solid
-from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import RigError
@@ -52,6 +51,7 @@ from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import Mesh, volume
 from viewer.rigs.pose import Pose

@@ -26,13 +26,13 @@ from viewer.autorig.alignment.orientation_search import (
     search,
 )
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
-from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints, freeze_fields
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import Up
 
 AlignedBy: TypeAlias = Literal["in place", "search", "landmarks", "given", "fit"]

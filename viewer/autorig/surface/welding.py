@@ -13,7 +13,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.topology import Indices, components, welded
-from viewer.rigs.mesh import triangle_areas
+from viewer.rigs.mesh import side_lengths, triangle_areas
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
 # less.
@@ -91,8 +91,8 @@ def stiff_islands(mesh: Welded) -> Bools:
     low, high = np.full((mesh.n_islands, 3), np.inf), np.full((mesh.n_islands, 3), -np.inf)
     np.minimum.at(low, mesh.islands, mesh.positions)
     np.maximum.at(high, mesh.islands, mesh.positions)
-    corners, owners = mesh.positions[mesh.triangles], mesh.islands[mesh.triangles[:, 0]]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    owners = mesh.islands[mesh.triangles[:, 0]]
+    sides = side_lengths(mesh.positions, mesh.triangles).max(axis=1)
     spans = sides >= _SPANS * np.linalg.norm(high - low, axis=1)[owners]
     areas = triangle_areas(mesh.positions, mesh.triangles)
     spanned = np.bincount(owners, areas * spans, mesh.n_islands)

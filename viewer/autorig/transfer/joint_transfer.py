@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.autorig.surface.samples import triangle_normals
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.blendshapes import JointRegressor
 from viewer.rigs.geometry.closest_point import Surface
+from viewer.rigs.geometry.samples import triangle_normals
 from viewer.rigs.skin import Skin, owners
 
 _ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched

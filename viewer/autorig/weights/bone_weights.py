@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from viewer.autorig.solid import Solid
 from viewer.autorig.surface.laplacian import laplacian
-from viewer.autorig.surface.samples import sample_surface
 from viewer.autorig.surface.welding import Welded, stiff_islands
 from viewer.autorig.weights.weight_transfer import conjugate_gradients, factorised, scaled_rows
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.progress import part_of_work, report, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.topology import part_volumes
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import path_to_root

@@ -32,8 +32,10 @@ from viewer.rigs.feet.curves import falling
 from viewer.rigs.feet.legs import Leg, leg_rotations
 from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import axis_vector, unit
 from viewer.rigs.hierarchy import descendants
+from viewer.rigs.mesh import area_vectors
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
@@ -451,24 +453,18 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
     mesh, skin = figure.mesh, figure.skin
     if mesh is None or skin is None or not figure.is_attached or not mesh.n_triangles:
         return None
-    corners = mesh.positions[mesh.triangles]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = 0.5 * np.linalg.norm(crosses, axis=1)
-    if not areas.sum() > 0.0:
+    vectors = area_vectors(mesh.positions, mesh.triangles)
+    area = 0.5 * float(np.linalg.norm(vectors, axis=1).sum())
+    if not area > 0.0:
         return None
-    # Equal areas lie between the points in the order of the triangles; within these, two powers of
-    # the plastic number spread them evenly (Roberts 2018).
-    steps = np.arange(_POINTS)
-    chosen = np.searchsorted(np.cumsum(areas), (steps + 0.5) / _POINTS * areas.sum())
-    chosen = chosen.clip(0, len(areas) - 1)
-    a, b = (steps * 0.7548776662466927) % 1.0, (steps * 0.5698402909980532) % 1.0
-    a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
-    factors = np.stack([1.0 - a - b, a, b], axis=1)
-    points = np.einsum("pk,pka->pa", factors, corners[chosen])
-    outward = np.sign(np.einsum("ta,ta->", corners[:, 0] - mesh.positions.mean(axis=0), crosses))
-    normals = (outward or 1.0) * unit(crosses[chosen])
+    samples = sample_surface(mesh.positions, mesh.triangles, _POINTS)
+    points = samples.positions
+    from_middle = mesh.positions[mesh.triangles[:, 0]] - mesh.positions.mean(axis=0)
+    outward = np.sign(np.einsum("ta,ta->", from_middle, vectors))
+    normals = (outward or 1.0) * samples.normals
     # Each moves with the strongest joint of the nearest corner.
-    nearest = mesh.triangles[chosen, factors.argmax(axis=1)]
+    corners = mesh.triangles[samples.triangles]
+    nearest = np.take_along_axis(corners, samples.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     strongest = np.full(mesh.n_vertices, -1, dtype=np.int32)
     influences = strongest_influences(skin)
     strongest[owners(skin)[influences]] = skin.joints[influences]
@@ -487,10 +483,9 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
         hands[is_hand & (np.linalg.norm(points - rest[wrist], axis=1) < reach)] = number
     if not {0, 1} <= set(hands.tolist()):
         return None
-    kept = np.flatnonzero((hands >= 0) | _is_solid(points, normals, areas.sum() / _POINTS))
-    movers, points, normals, arms, hands = (
-        each[kept] for each in (movers, points, normals, arms, hands)
-    )
+    kept = np.flatnonzero((hands >= 0) | _is_solid(points, normals, area / _POINTS))
+    movers, arms, hands = movers[kept], arms[kept], hands[kept]
+    points, normals = points[kept], normals[kept]
     crown = None
     if "head" in joints:
         own = descendants(parents, joints["head"])[movers]

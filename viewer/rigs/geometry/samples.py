@@ -1,4 +1,4 @@
-"""Evenly distributed sample points of a surface, for the evaluation of alignments."""
+"""Evenly distributed sample points of a surface."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ class SurfaceSamples:
     """(N, 3). Unit normals of the triangles on which they lie."""
     triangles: Ints
     """(N,). Those triangles."""
+    weights: Floats
+    """(N, 3). Barycentric coordinates of the points in them."""
 
     def __post_init__(self) -> None:
         freeze_fields(self, positions=(None, 3))
         freeze_fields(self, normals=(len(self.positions), 3))
         freeze_fields(self, np.int32, triangles=(len(self.positions),))
+        freeze_fields(self, weights=(len(self.positions), 3))
 
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
@@ -49,6 +52,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
         np.einsum("nk,nka->na", weights, corners),
         triangle_normals(positions, triangles[chosen]),
         chosen,
+        weights,
     )
 
 
@@ -62,6 +66,6 @@ def _even_triangles(positions: Floats, triangles: Ints, count: int) -> Ints:
     areas = triangle_areas(positions, triangles)
     total = np.cumsum(areas)
     if len(areas) == 0 or not total[-1] > 0.0:
-        raise RigError("expected a mesh with an area to align, found none")
+        raise RigError("expected a mesh with an area, found none")
     places = (np.arange(count) + 0.5) / count * total[-1]
     return np.minimum(np.searchsorted(total, places), len(areas) - 1).astype(np.int32)
