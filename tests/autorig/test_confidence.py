@@ -10,15 +10,25 @@ from viewer.autorig import pipeline
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.anatomy import Limb, LimbPair
-from viewer.autorig.confidence import Body, confidence, doubts, findings, judge, refusal
+from viewer.autorig.confidence import (
+    Body,
+    confidence,
+    doubts,
+    findings,
+    judge,
+    refusal,
+    remarks,
+)
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import TransferSettings
 from viewer.autorig.solid import solid_of
 from viewer.diagnostics import note
 from viewer.errors import RigError
-from viewer.loading import bundled_body, load
+from viewer.loading import bundled_body, bundled_files, load
+from viewer.rigs.figure import figure_pose
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.skin import skin_from_entries
+from viewer.rigs.skinning import joint_matrices
 
 PARENTS = np.array([-1, 0, 1])
 JOINTS = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
@@ -204,6 +214,60 @@ def test_trunk_is_upright_along_the_stated_up_axis(person):
 
 def test_person_who_bows_fits_closely(person):
     assert "trunk" not in leaning(person, 60.0, gap=0.009)
+
+
+def raised(person, degrees, neck=0.0):
+    """Return findings on a rig of the person with raised arms, horizontal at 0.
+
+    ``neck``: length of the neck relative to the person's.
+    """
+    figure, solid = person
+    pose = rest_pose(figure.skeleton)
+    joints, names = joint_matrices(figure, pose)[:, :3, 3], figure.skeleton.names
+    offsets = figure.skeleton.rest_translations.copy()
+    offsets[[names.index("neck"), names.index("head")]] *= neck
+    rig = replace(figure, skeleton=replace(figure.skeleton, rest_translations=offsets))
+    rigged = figure_pose(rig)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        way = joints[names.index(f"{side}_wrist")] - joints[names.index(f"{side}_shoulder")]
+        now = np.arctan2(way[1], sign * way[0])
+        rigged[f"{side}_shoulder"] = [0.0, 0.0, sign * (np.radians(degrees) - now)]
+    found = judge(figure, pose, rig, rigged, figure.mesh, alignment(0.02), (solid, solid))
+    return [each for each in found if each.sentence.startswith("R017.head")]
+
+
+def test_arms_above_a_head_between_the_shoulders_may_be_ears(person):
+    (low,), (level,), (high,) = (raised(person, degrees) for degrees in (-90.0, 0.0, 90.0))
+    assert low.value < level.value < high.value
+    # Arms that point up instead of down have their middle higher by their length.
+    figure, _ = person
+    joints = joint_matrices(figure, rest_pose(figure.skeleton))[:, :3, 3]
+    at = dict(zip(figure.skeleton.names, joints, strict=True))
+    arm = float(np.linalg.norm(at["left_hand"] - at["left_shoulder"]))
+    trunk = 0.5 * (at["left_collar"] + at["right_collar"] - at["left_hip"] - at["right_hip"])
+    assert high.value - low.value == pytest.approx(arm / np.linalg.norm(trunk), rel=0.05)
+    assert low.rating == 1.0 and high.rating == 0.0
+    # A person may raise the arms.
+    assert raised(person, 90.0, neck=1.0) == []
+
+
+def test_animal_with_a_low_head_is_no_person():
+    figure = load(*bundled_files()).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    solid = solid_of(figure.mesh.positions, figure.mesh.triangles, 24)
+    found = judge(figure, pose, figure, pose, figure.mesh, alignment(0.02), (solid, solid))
+    keys = {each.sentence[5:].split(":")[0] for each in found}
+    assert "trunk" in keys and "head" not in keys
+
+
+def test_what_is_nearly_a_doubt_is_said(person):
+    # Leaning by 37 degrees is rated 0.6, by 20 degrees 1.
+    unsure, sure, wrong = ((leaning(person, angle)["trunk"],) for angle in (37.0, 20.0, 60.0))
+    (line,) = remarks(unsure)
+    assert line.key == "R017.unsure" and line.severity == "warning"
+    assert "degrees more or less than in the template: check it in several poses" in str(line)
+    assert refusal(unsure) == "" and [*remarks(sure)] == []
+    assert [*map(str, remarks(wrong))] == [*map(str, doubts(wrong))] != []
 
 
 def test_wrong_rig_is_refused_unless_insisted_on(monkeypatch):

@@ -9,6 +9,7 @@ says little. A rig is right if the limbs of the template are where the target ha
 - the solid is as thick as that of the template: a picture cut out of cardboard is not;
 - the trunk is as upright as in the template, unless the surfaces agree closely: a bird with its
   wings for arms leans forward, a person whose rig is a fox's lies on the back;
+- arms are not above a head that is hardly above the shoulders: they may be the ears of a rabbit;
 - bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
 
@@ -44,6 +45,7 @@ from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh, triangle_areas, volume
 from viewer.rigs.pose import Pose
 from viewer.rigs.retargeting.mirror import joint_partners
@@ -53,6 +55,7 @@ from viewer.rigs.skinning.lbs import move
 
 ENOUGH = 0.5
 """Confidence below which a rig is probably wrong."""
+_SURE = 0.75  # confidence below which a rig may be wrong
 
 _FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
 _REMEDY = (
@@ -62,8 +65,10 @@ _REMEDY = (
 # Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
 # be apart; where none were found, only a shape that agrees everywhere shows that they are there.
 _FOUND_LIMBS, _NO_LIMBS = (0.045, 0.02), (0.03, 0.01)
-# Misfit up to which a trunk may lean: a person who bows fits as closely as one who stands upright.
-_SAME_KIND = 0.01
+_SAME_KIND = 0.01  # misfit up to which a trunk may lean
+# Height of the head above the shoulders relative to the template's, below which arms may be ears.
+_NECK = 0.5
+_UPRIGHT = np.cos(np.radians(45.0))  # of the angle of an upright trunk: animals have no arms
 _BEND = np.radians(40.0)  # rotation of every joint in the test pose
 _ALONG = np.linspace(0.1, 0.9, 9)  # places on a bone that are looked at
 _FOOT = 0.15  # part of a leg's path from its tip that is left out: toes may have no bones
@@ -105,6 +110,18 @@ class Finding:
 def confidence(found: tuple[Finding, ...]) -> float:
     """Return the least rating, 1 for a rig that was not judged."""
     return min((finding.rating for finding in found), default=1.0)
+
+
+def remarks(found: tuple[Finding, ...]) -> Iterator[Diagnostic]:
+    """Return the doubts; if there are none, a message about findings that are nearly one."""
+    yield from doubts(found)
+    near = sorted((each for each in found if each.rating < _SURE), key=lambda each: each.rating)
+    if near and near[0].rating >= ENOUGH:
+        reasons = "; ".join(str(note(each.sentence, value=each.value)) for each in near)
+        yield note(
+            "R017.unsure: the rig may be wrong: {reasons}: check it in several poses",
+            reasons=reasons,
+        )
 
 
 def doubts(found: tuple[Finding, ...]) -> Iterator[Diagnostic]:
@@ -155,7 +172,7 @@ def judge(
             alignment,
             legs,
         ),
-        *_upright(template, joints, rigged, axis_direction(up), alignment),
+        *_posture(template, joints, rigged, axis_direction(up), alignment),
     )
 
 
@@ -284,39 +301,70 @@ def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> t
     )
 
 
-def _upright(
+def _posture(
     template: Figure, joints: Floats, rigged: Floats, up: Floats, alignment: Alignment
 ) -> tuple[Finding, ...]:
-    """Return a finding about the trunk, none if the template has none or the surfaces agree.
+    """Return findings about trunk, arms and head, none if the template has no two pairs of limbs.
 
     ``joints``, ``rigged``: (J, 3), those of the posed template and of the target.
     """
-    trunk = _trunk(template, joints)
-    if trunk is None or misfit(alignment, False) <= _SAME_KIND:
+    try:
+        partners = joint_partners(template)
+    except RigError:
+        return ()  # without symmetry, there are no pairs
+    parents = template.require_skeleton().parents
+    trunk = _trunk(parents, partners, joints)
+    if trunk is None:
         return ()
     angles = []
     for places, vertical in ((joints, axis_direction(template.up)), (rigged, up)):
         way = unit(places[list(trunk[1])].mean(axis=0) - places[list(trunk[0])].mean(axis=0))
         angles.append(float(np.degrees(np.arccos(np.clip(way @ vertical, -1.0, 1.0)))))
-    # Halfway: 40 degrees. Characters that are rigged well have up to 20, a bird with the arms of a
-    # person in its wings 46, animals with two legs for four, or the reverse, 50 to 95.
-    return (
-        Finding(
+    found = []
+    # A person who bows fits as closely as one who stands upright.
+    if misfit(alignment, False) > _SAME_KIND:
+        # Halfway: 40 degrees. Characters that are rigged well have up to 20, a bird with the arms
+        # of a person in its wings 46, animals with two legs for four, or the reverse, 50 to 95.
+        leaning = Finding(
             "R017.trunk: the trunk leans {value:.0f} degrees more or less than in the template",
             abs(angles[1] - angles[0]),
             wrong=55.0,
             good=25.0,
-        ),
+        )
+        found.append(leaning)
+    heights = joints @ axis_direction(template.up)
+    legs, arms = sorted(trunk, key=lambda pair: float(heights[list(pair)].sum()))
+    head = _head(parents, partners, heights, arms)
+    is_upright = abs(np.cos(np.radians(angles[0]))) > _UPRIGHT
+    if not is_upright or head is None:
+        return tuple(found)
+    ends = [_end(parents, joints, joint) for joint in arms]
+    rises = []
+    for places, vertical in ((joints, axis_direction(template.up)), (rigged, up)):
+        hips, shoulders, hands = (places[list(each)].mean(axis=0) for each in (legs, arms, ends))
+        length = max(float(np.linalg.norm(shoulders - hips)), 1e-12)
+        middle = 0.5 * (shoulders + hands)
+        points = middle, places[head], shoulders
+        rises.append([float(point @ vertical) / length for point in points])
+    usual, own = (top - shoulder for _, top, shoulder in rises)
+    if own > _NECK * usual:
+        return tuple(found)  # people may raise their arms
+    # A rabbit that is rigged well has -0.1 with outstretched arms; one with its ears for arms has
+    # 0.2 to 0.3.
+    raised = Finding(
+        "R017.head: the middle of the arms is {value:.0%} of the trunk's length above the head: "
+        "they may be ears",
+        rises[1][0] - rises[1][1],
+        wrong=0.1,
+        good=-0.1,
     )
+    return (*found, raised)
 
 
-def _trunk(figure: Figure, joints: Floats) -> tuple[tuple[int, int], tuple[int, int]] | None:
+def _trunk(
+    parents: Ints, partners: Ints, joints: Floats
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
     """Return the first joints of the longest pairs of limbs at both ends of the trunk, or None."""
-    try:
-        partners = joint_partners(figure)
-    except RigError:
-        return None  # without symmetry, there are no pairs
-    parents = figure.require_skeleton().parents
     reach = np.zeros(len(parents))
     for joint in range(len(parents) - 1, -1, -1):
         if (parent := int(parents[joint])) >= 0:
@@ -334,6 +382,20 @@ def _trunk(figure: Figure, joints: Floats) -> tuple[tuple[int, int], tuple[int, 
         return None
     one, other = ((joint, int(partners[joint])) for joint in (firsts[0], others[0]))
     return one, other
+
+
+def _head(parents: Ints, partners: Ints, heights: Floats, arms: tuple[int, int]) -> int | None:
+    """Return the highest joint between the sides that is below the same joint as the arms."""
+    chest = int(parents[arms[0]])
+    between = np.flatnonzero(descendants(parents, chest) & (partners == np.arange(len(parents))))
+    head = int(between[heights[between].argmax()])
+    return None if head == chest else head
+
+
+def _end(parents: Ints, joints: Floats, joint: int) -> int:
+    """Return the joint of a limb that is farthest from its first one."""
+    limb = np.flatnonzero(descendants(parents, joint))
+    return int(limb[np.linalg.norm(joints[limb] - joints[joint], axis=1).argmax()])
 
 
 def _lengths(body: Body, bones: Ints) -> Floats:

@@ -20,7 +20,7 @@ from viewer.autorig.checks import (
     residual_of,
     with_joint_name,
 )
-from viewer.autorig.confidence import doubts, judge, refusal
+from viewer.autorig.confidence import judge, refusal, remarks
 from viewer.autorig.correspondence import Template, with_reversed_winding
 from viewer.autorig.rigged import Rigged, with_fields
 from viewer.autorig.seed import nearest
@@ -119,7 +119,7 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     if not how.insists and (why := refusal(found, met.alike)):
         raise RigError(why)
     lines = [
-        *doubts(found),
+        *remarks(found),
         *alignment_lines(alignment),
         *met.lines,
         *(with_joint_name(line, figure) for line in weights.lines),

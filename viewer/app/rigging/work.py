@@ -42,7 +42,7 @@ from viewer.autorig.alignment.surface_alignment import (
     stated_up,
 )
 from viewer.autorig.bones_from_motion import error_lines, rig_motion
-from viewer.autorig.confidence import doubts, judge
+from viewer.autorig.confidence import judge, remarks
 from viewer.autorig.correspondence import MatchSettings, match
 from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.curve_skeleton import find_skeleton
@@ -500,7 +500,7 @@ def _with_known_method(
     up = placing.settings.up
     found = judge(figure, pose, rigged.figure, rigged.pose, target, known_alignment, up=up)
     rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
-    lines = (*doubts(found), *alignment_lines(known_alignment), *placing.lines, *rest)
+    lines = (*remarks(found), *alignment_lines(known_alignment), *placing.lines, *rest)
     return replace(rigged, alignment=known_alignment, lines=lines, findings=found)
 
 
