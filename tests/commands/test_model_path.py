@@ -8,6 +8,7 @@ from exporters.plain_readers import read_obj
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
+import viewer
 from viewer import models
 from viewer.cli import run
 
@@ -122,7 +123,22 @@ def test_empty_folder_is_reported(tmp_path, capsys):
 
 
 def test_name_without_a_model_folder_is_a_missing_file(capsys):
-    assert refused(capsys, "info", "smplx") == "smplx: cannot be read: No such file or directory"
+    assert refused(capsys, "info", "any") == "any: cannot be read: No such file or directory"
+
+
+def test_published_model_that_is_missing_says_where_it_is(folder, capsys):
+    line = (
+        "smplx: no such file or model; SMPL-X is published at https://smpl-x.is.tue.mpg.de; name "
+        "its folder once: viewer models --model-path FOLDER"
+    )
+    assert refused(capsys, "info", "smplx") == line
+    with pytest.raises(viewer.ViewerError) as caught:
+        viewer.load("smplx")
+    assert str(caught.value) == line
+    # Once a folder is named, errors list what it has, from Python too.
+    assert told(capsys, "smplx:neutral", "--model-path", str(folder))
+    with pytest.raises(viewer.ViewerError, match=r"no such file or model in .*available models: "):
+        viewer.load("smplx:male")
 
 
 def test_existing_file_takes_precedence_over_a_model(folder, tmp_path, capsys):
@@ -254,7 +270,7 @@ def test_bundled_body_opens_together_with_other_files(folder, capsys):
 
 
 def test_unknown_name_among_many_suggests_the_nearest(folder, capsys, monkeypatch):
-    monkeypatch.setattr("viewer.commands._scene._MOST_MODELS", 2)
+    monkeypatch.setattr("viewer.models.download._MOST_LISTED", 2)
     line = refused(capsys, "info", "smplx:femal", "--model-path", str(folder))
     assert "; did you mean smplx:female" in line and "available models" not in line
 

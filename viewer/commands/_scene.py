@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,6 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
-from viewer.phrases import all_of
 from viewer.progress import report
 from viewer.rigs.scene import Scene
 from viewer.streams import summary_stream
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
     from viewer.rigs.retargeting.joint_map import JointMap
 
 _DEFAULT = "the bundled figure"
-_MOST_MODELS = 12  # maximum number of names in a message
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
 """Suffixes of writable image formats."""
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}  # suffixes of sizes, bytes
@@ -242,31 +240,13 @@ def begin_scene(options: SceneOptions) -> tuple[Scene, list[Builder]]:
             contents = read_files(files or bundled_files(), options.size_limit, options.motion)
             scene, builders = begin(contents, options.motion)
     except FormatError as problem:
+        from viewer.models.download import with_models
+
         model = options.motion.model
         named = [*options.files, *([] if model is None else [model])]
-        raise _with_models(problem, named) from None
+        raise with_models(problem, named) from None
     print_warnings(scene.diagnostics)
     return scene, builders
-
-
-def _with_models(problem: FormatError, files: Sequence[str | Path]) -> ViewerError:
-    """Add the names of available models to an error about an unknown name."""
-    from viewer.models import known_models, load_model_folder
-    from viewer.near_names import did_you_mean
-
-    folder = load_model_folder()
-    missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
-    if not missing or folder is None or len(problem.path.parts) != 1:
-        return problem
-    models = [*known_models(folder)]
-    near = did_you_mean(str(problem.path), models) if len(models) > _MOST_MODELS else ""
-    values = {"folder": folder, "near": near, "names": all_of(models[:_MOST_MODELS])}
-    key = (
-        "F001.no-model-near: no such file or model in {folder}; {near}"
-        if near
-        else "F001.no-model: no such file or model in {folder}; available models: {names}"
-    )
-    return FormatError(Diagnostic(key, problem.path, values=values))
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warning") -> None:

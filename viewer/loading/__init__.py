@@ -7,7 +7,7 @@ from pathlib import Path
 from types import NoneType
 
 from viewer.arguments import check_type
-from viewer.errors import ViewerError
+from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.contents import Contents, read_files, read_source
@@ -33,7 +33,7 @@ __all__ = [
 def load(
     *paths: str | Path,
     model: str | Path | None = None,
-    gender: str = "",
+    gender: str | None = None,
     max_size: int = MAX_SIZE,
     motion: MotionSettings | None = None,
 ) -> Scene:
@@ -59,7 +59,7 @@ def load(
     model
         Body model for captured bodies, or figure that a BVH file drives: a file or a name.
     gender
-        Gender of the body model, if it is not that of the files.
+        Gender of the body model; that of the files by default.
     max_size
         Larger files, in bytes, are rejected before they are read.
     motion
@@ -89,12 +89,17 @@ def load(
             )
     check_type("model", model, str, Path, NoneType)
     check_type("motion", motion, MotionSettings, NoneType)
-    check_type("gender", gender, str)
+    check_type("gender", gender, str, NoneType)
     check_type("max_size", max_size, float)
     if gender and gender not in GENDERS:
         raise ViewerError(f'gender: expected {" or ".join(GENDERS)}, found "{printable(gender)}"')
     settings = motion or MotionSettings()
     if model is not None or gender:
-        settings = replace(settings, model=model or settings.model, gender=gender)
+        settings = replace(settings, model=model or settings.model, gender=gender or "")
     named = [path for each in paths for path in named_files(each)]
-    return assemble(read_files(named or bundled_files(), max_size, settings), settings)
+    try:
+        return assemble(read_files(named or bundled_files(), max_size, settings), settings)
+    except FormatError as problem:
+        from viewer.models.download import with_models
+
+        raise with_models(problem, [*paths, *([model] if model is not None else [])]) from None

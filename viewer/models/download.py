@@ -1,4 +1,4 @@
-"""Catalogue of body models, and download of the freely licensed ones into the data folder."""
+"""Catalogue of body models: errors about missing ones, and downloads into the data folder."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from viewer.data_classes import dataclass
-from viewer.errors import OutputError, ViewerError
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, OutputError, ViewerError
 from viewer.formats import Source, detect
 from viewer.media.unfinished import new_prefix
-from viewer.models import data_folder
-from viewer.phrases import printable
+from viewer.models import data_folder, known_models, load_model_folder
+from viewer.near_names import did_you_mean
+from viewer.phrases import all_of, printable
 from viewer.progress import report
 
 ADDABLE = {"anny": "anny==0.6.2"}
 """Models that can be added, and the Python package of each, in a tested version."""
+_MOST_LISTED = 12  # maximum number of names in a message
 _EVERY = 0.2  # seconds between two looks at whether the download is cancelled
 
 
@@ -120,3 +124,31 @@ CATALOG = {
     "pig": Publication("PIG", "a pig", "MIT", "https://github.com/anl13/PIG_model"),
 }
 """Publications by the kind of model, the part of its name before the colon."""
+
+
+def with_models(problem: FormatError, files: Sequence[str | Path]) -> FormatError:
+    """Add the names of available models to an error about an unknown name among some files."""
+    missing = [file for file in files if Path(file) == problem.path and not os.path.exists(file)]  # noqa: PTH110
+    if not missing or len(problem.path.parts) != 1:
+        return problem
+    folder = load_model_folder()
+    if folder is None:
+        published = CATALOG.get(str(problem.path).lower().partition(":")[0])
+        if published is None:
+            return problem
+        return FormatError.fault(
+            "F001.no-model-folder: no such file or model; {title} is published at {address}; name "
+            "its folder once: viewer models --model-path FOLDER",
+            problem.path,
+            title=published.title,
+            address=published.address,
+        )
+    models = [*known_models(folder)]
+    near = did_you_mean(str(problem.path), models) if len(models) > _MOST_LISTED else ""
+    values = {"folder": folder, "near": near, "names": all_of(models[:_MOST_LISTED])}
+    key = (
+        "F001.no-model-near: no such file or model in {folder}; {near}"
+        if near
+        else "F001.no-model: no such file or model in {folder}; available models: {names}"
+    )
+    return FormatError(Diagnostic(key, problem.path, values=values))
