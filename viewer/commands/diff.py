@@ -475,6 +475,9 @@ class Comparison:
     def __str__(self) -> str:
         return "\n".join(_lines_of(self, None))
 
+    def __repr__(self) -> str:
+        return f"<Comparison {self}>"
+
     def exceeds(self, tolerance: float) -> bool:
         """Return whether anything differs by more than the tolerance or was not compared."""
         parts = (difference.exceeds(tolerance) for _, difference in self.differences)

@@ -147,6 +147,9 @@ class Diagnostic:
         """Location and message, prefixed with the severity unless it is a note."""
         return str(self) if self.severity == "note" else f"{self.severity}: {self}"
 
+    def __repr__(self) -> str:
+        return f"<{self.key}: {self}>"
+
     def __str__(self) -> str:
         """Return location and message on one line."""
         return ": ".join(filter(None, (self.place, self.message)))
