@@ -37,7 +37,7 @@ WRONG = {
     "job: expected a text or Callable, found list": lambda: viewer.batch("nope", ["x"]),
     "report: expected a text or PathLike, found int": lambda: viewer.batch([], "info", report=3),
     "clean: expected a scene or an actor, found int": lambda: viewer.clean(3),
-    "times: expected int or Iterable, found float": lambda: viewer.onion(ACTOR, 0.5),
+    "times: expected an integer or Iterable, found float": lambda: viewer.onion(ACTOR, 0.5),
     "times: expected at least one, found -1": lambda: viewer.onion(
         viewer.animate(BONED, np.zeros((2, 1, 3))), -1
     ),
@@ -50,30 +50,32 @@ WRONG = {
     "time: expected a number, found list": lambda: ACTOR.joints(time=[1]),
     "time: expected a number, found tuple": lambda: viewer.Actor(PLAIN).vertices(time=()),
     "time: expected seconds, found nan": lambda: ACTOR.joints(time=float("nan")),
-    "actors: expected Iterable, found int": lambda: viewer.Scene(3),
+    "actors: expected a sequence of Actor, found int": lambda: viewer.Scene(3),
     "own_pose: expected Pose or None, found int": lambda: viewer.Actor(BONED, 3),
     "target: expected shape 3, found a single number": lambda: viewer.Camera(3),
     "distance: expected a number, found str": lambda: viewer.Camera(distance="x"),
     "azimuth: expected a number, found str": lambda: viewer.Light("x"),
-    "color: expected Sequence, found int": lambda: viewer.Light(color=3),
+    "color: expected 3 numbers, found int": lambda: viewer.Light(color=3),
     "key: expected Light, found int": lambda: viewer.Lights(3),
-    "sky: expected Sequence, found int": lambda: viewer.Lights(sky=3),
+    "sky: expected 3 numbers, found int": lambda: viewer.Lights(sky=3),
     "name: expected a text, found float": lambda: viewer.Texture(3.0),
-    "wrap: expected Sequence, found int": lambda: viewer.Texture("t", wrap=3),
+    'wrap: expected ("clamp" or "repeat"': lambda: viewer.Texture("t", wrap=3),
     "name: expected a text, found NoneType": lambda: viewer.Material(None),
     "base_texture: expected Texture or None, found int": lambda: viewer.Material("", 3),
     "metallic: expected a number, found str": lambda: viewer.Material(metallic="x"),
-    "emissive: expected Sequence, found int": lambda: viewer.Material(emissive=3),
+    "emissive: expected 3 numbers, found int": lambda: viewer.Material(emissive=3),
     "options: expected ExportOptions or None, found int": lambda: viewer.export(
         ACTOR, "a.glb", options=3
     ),
     "speed: expected a number or None, found str": lambda: viewer.video(ACTOR, "a.gif", speed="x"),
-    "orthographic: expected bool, found list": lambda: viewer.render(ACTOR, orthographic=[1]),
+    "orthographic: expected True or False, found list": lambda: viewer.render(
+        ACTOR, orthographic=[1]
+    ),
     "azimuth: expected a finite number, found inf": lambda: viewer.render(
         ACTOR, azimuth=float("inf")
     ),
     "camera: expected Camera or None, found int": lambda: viewer.show(ACTOR, 3),
-    "gender: expected a text, found list": lambda: viewer.load(gender=["male"]),
+    "gender: expected a text or None, found list": lambda: viewer.load(gender=["male"]),
     "max_size: expected a number, found str": lambda: viewer.load(max_size="x"),
 }
 

@@ -13,13 +13,20 @@ def check_type(name: str, value: object, *kinds: type) -> None:
     allowed = tuple(Real if kind is float else kind for kind in kinds)
     if isinstance(value, allowed):
         return
-    named = [_NAMES.get(kind, kind.__name__) for kind in kinds]
+    named = [type_name(kind) for kind in kinds]
     raise RigError(f"{name}: expected {' or '.join(named)}, found {type(value).__name__}")
+
+
+def type_name(kind: type) -> str:
+    """Return what an error says about a type that is expected."""
+    return _NAMES.get(kind, kind.__name__)
 
 
 _NAMES: dict[type, str] = {
     float: "a number",
+    int: "an integer",
     str: "a text",
+    bool: "True or False",
     range: "a range such as range(10)",
     NoneType: "None",
 }

@@ -294,7 +294,7 @@ TINY = (32, 24)
         (lambda: viewer.rest_pose(leg()), "^skeleton: expected Skeleton, found Figure"),
         (lambda: viewer.shaped(ACT, [1.0]), "^figure: expected Figure, found Actor"),
         (lambda: viewer.with_rest_mesh(3, SQUARE), "^figure: expected Figure, found int"),
-        (lambda: viewer.Scene([leg()]), "^actors: expected Actor, found Figure"),
+        (lambda: viewer.Scene([leg()]), r"^actors\[0\]: expected Actor, found Figure"),
         (lambda: viewer.motion(viewer.Scene([ACT])), "^motion: expected Actor, found Scene"),
         (lambda: viewer.pose_errors(1, ACT), "^found: expected Actor, found int"),
         (lambda: viewer.Actor("fox"), "^figure: expected Figure, found str"),

@@ -602,7 +602,7 @@ def test_bad_message_is_answered_counted_and_survived(screen, message, why):
 )
 def test_actor_that_cannot_be_drawn_is_refused(screen, live, name, value):
     actor, arrays = viewer.Actor(bar()), []
-    setattr(actor, name, value)
+    object.__setattr__(actor, name, value)  # as another program may send it
     told = {"object": pack(actor, arrays)}
     with pytest.raises(ViewerError, match=name):
         live._ask("put", told, arrays)
@@ -620,9 +620,9 @@ def test_look_may_be_numbers_of_numpy(screen, live):
     actor = live.add(viewer.Actor(bar(), color=color, visible=np.bool_(False)))
     shown = screen.state.scene.actors[-1]
     assert (shown.visible, shown.color) == (False, (1.0, 0.5, 0.0))
-    color[2], actor.visible, actor.opacity = 0.25, np.bool_(True), np.float32(0.5)
+    actor.color, actor.visible, actor.opacity = color / 2, np.bool_(True), np.float32(0.5)
     live.update()
-    assert (shown.visible, shown.color, shown.opacity) == (True, (1.0, 0.5, 0.25), 0.5)
+    assert (shown.visible, shown.color, shown.opacity) == (True, (0.5, 0.25, 0.0), 0.5)
 
 
 def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, monkeypatch):
@@ -671,16 +671,15 @@ def test_of_many_poses_the_latest_is_shown(tmp_path):
 def test_error_of_the_thread_is_raised_by_update(screen, live, capsys, name):
     actor = live.add(bar())
     if name == "pose":
-        actor.pose.dofs = np.full(6, np.nan)
+        actor.pose.dofs[:] = np.nan
     else:
-        actor.placement = "nowhere"
+        actor.placement[0, 3] = np.nan
     deadline = time.monotonic() + 10
     while not live._problem and time.monotonic() < deadline:
         time.sleep(0.01)
-    why = "finite" if name == "pose" else "nowhere"
-    with pytest.raises(ViewerError, match=why):
+    with pytest.raises(ViewerError, match="finite"):
         live.update()
-    assert why in capsys.readouterr().err
+    assert "finite" in capsys.readouterr().err
     actor.pose.dofs, actor.placement = np.zeros(6), np.eye(4)
     live.update()
 

@@ -124,7 +124,7 @@ def test_parts_of_a_pose_are_views_and_copy_what_is_assigned():
     held = pose.rotations
     held[0, 0] = -9.0
     assert (pose.rotations[0, 0], pose.rotations[1, 3], pose.scales[1, 2]) == (-9.0, 16.0, 44.0)
-    with pytest.raises(ValueError, match="broadcast"):
+    with pytest.raises(RigError, match=r"dofs: expected numbers of shape \(2,\)"):
         pose.dofs = np.zeros(3)
 
 
@@ -133,7 +133,7 @@ def test_parts_of_a_pose_are_views_and_copy_what_is_assigned():
 )
 def test_poses_refuse_values_that_are_not_those_of_whole_joints(values, n_dofs):
     assert Pose(np.zeros(15), 2).rotations.shape == (1, 4)
-    with pytest.raises(RigError, match="values of a pose"):
+    with pytest.raises(RigError, match=r"^values|^n_dofs"):
         Pose(values, n_dofs)
 
 

@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from numbers import Real
 from pathlib import Path
 from types import NoneType
 
@@ -20,11 +19,10 @@ from viewer.commands._scene import SceneOptions
 from viewer.commands._sequence import Request, parse_turntable
 from viewer.commands._view import ViewOptions, camera_of
 from viewer.errors import RigError, ViewerError
-from viewer.near_names import did_you_mean, name_hint
+from viewer.near_names import did_you_mean
 from viewer.phrases import all_of, printable
 from viewer.rendering.camera import Camera
 from viewer.rendering.camera_views import with_cameras
-from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.offscreen import render as draw
 from viewer.rendering.options import SIZE, DisplayOptions, Quality
 from viewer.rigs.arrays import Bytes
@@ -280,7 +278,6 @@ def display_options(
             setattr(shown, name, value)
     if settings.get("scalar") is not None and settings.get("shading") is None:
         shown.shading = "scalar"
-    _check_display(shown)
     return shown
 
 
@@ -289,30 +286,3 @@ def _check_scalar(scene: Scene, options: DisplayOptions) -> None:
     notes = scalar_notes(scene, options)
     if notes:
         raise ViewerError(notes[0])
-
-
-def _check_display(options: DisplayOptions) -> None:
-    """Raise ViewerError if a display option has another type than its default, or no such value."""
-    usual = DisplayOptions()
-    for each in dataclasses.fields(options):
-        choices = SHADING_CHOICES if each.name == "shading" else each.metadata.get("choices")
-        value = getattr(options, each.name)
-        if choices and value not in [*choices]:
-            hint = name_hint(str(value), [*choices])
-            raise ViewerError(f'{each.name}: no value "{printable(value, 60)}"; {hint}')
-        kinds = _OPTIONAL.get(each.name) or (type(getattr(usual, each.name)),)
-        check_type(each.name, value, *kinds)
-        low, high = each.metadata.get("limits", (-math.inf, math.inf))
-        if "limits" in each.metadata and not low <= value <= high:
-            raise ViewerError(f"{each.name}: expected {low:g} to {high:g}, found {value:g}")
-    ends = options.scalar_range
-    if ends is not None and (len(ends) != 2 or not all(isinstance(end, Real) for end in ends)):
-        raise ViewerError(f"scalar_range: expected two numbers, found {printable(ends, 60)}")
-
-
-_OPTIONAL: dict[str, tuple[type, ...]] = {
-    "scalar_range": (tuple, NoneType),
-    "isolines": (bool, NoneType),
-    "skeleton_opacity": (float, NoneType),
-}
-"""Types of the display options that are None by default; the others have that of their default."""

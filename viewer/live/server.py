@@ -16,12 +16,10 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from pathlib import Path
-from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.live.connection_file import file_path, read_file, write_file
@@ -32,7 +30,6 @@ from viewer.live.messages import (
     Message,
     MessageError,
     Values,
-    finite,
     packed,
     read,
     receiver,
@@ -40,8 +37,6 @@ from viewer.live.messages import (
 )
 from viewer.live.objects import pack, unpack
 from viewer.phrases import printable
-from viewer.rigs.arrays import frozen
-from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor, pose_actors, time_span
 from viewer.rigs.skinning import deform
@@ -351,31 +346,8 @@ def _content(message: Message) -> Any:
     return found
 
 
-_FIELDS: dict[str, tuple[type, ...]] = {
-    "visible": (bool,),
-    "is_present": (bool,),
-    "person": (int, NoneType),
-    "called": (str,),
-    "hidden_parts": (frozenset,),
-    "shape_space": (ShapeSpace,),
-}
-"""Types of fields of an actor, which its constructor does not check."""
-
-
 def _check(actor: Actor) -> None:
-    """Check an actor's fields, and skin it once: what does not fit is refused before drawing."""
-    for name, kinds in _FIELDS.items():
-        check_type(name, getattr(actor, name), *kinds)
-    for part in actor.hidden_parts:
-        check_type("hidden_parts", part, int)
-    frozen("placement", actor.placement, (4, 4))
-    for name in ("opacity", "offset"):
-        finite(name, getattr(actor, name))
-    if actor.color is not None:
-        red, green, blue = frozen("color", actor.color, (3,)).tolist()
-        actor.color = red, green, blue
-    if actor.points is not None and (actor.points.ndim, *actor.points.shape[1:]) != (2, 4):
-        raise MessageError(f"points: expected shape (N, 4), found {actor.points.shape}")
+    """Pose and skin an actor once: what does not fit is refused before drawing."""
     if actor.clip is not None:
         pose_actors([actor.copy()], time_span([actor])[0])
     if actor.figure.mesh is not None and actor.figure.mesh.n_vertices == 0:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from viewer.arguments import check_type
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Floats, frozen
+from viewer.rigs.arrays import Floats
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import bounding_box, box_size
 
@@ -44,11 +44,12 @@ _MARGIN = 1.08  # margin around a framed figure
 _SMALLEST = 1e-9  # minimum distance, for framing a single point
 
 
+@checked
 @dataclass(slots=True)
 class Camera:
     """Position, orientation and projection of an orbit camera."""
 
-    target: Floats = field(default_factory=lambda: np.zeros(3))
+    target: Floats = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
     """(3,). Point that the camera orbits, scene space."""
     distance: float = 3.0
     """Distance from eye to target, scene units."""
@@ -69,13 +70,6 @@ class Camera:
     """Azimuth of the front view; named views are relative to it."""
     seen: CameraView | None = None
     """``fixed`` at the time and in the pose of the scene; None if it does not move."""
-
-    def __post_init__(self) -> None:
-        self.target = np.array(frozen("target", self.target, (3,)))
-        for name in ("distance", "azimuth", "inclination", "fov", "front"):
-            check_type(name, getattr(self, name), float)
-        check_type("orthographic", self.orthographic, bool, np.bool_)
-        check_type("up", self.up, str)
 
     def copy(self) -> Camera:
         """Return an independent copy."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from viewer.arguments import check_type
 from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
@@ -78,6 +77,7 @@ QUALITIES: dict[Quality, str] = {
 _DEGREES = "%.0f\N{DEGREE SIGN}"
 
 
+@checked
 @dataclass(slots=True)
 class Light:
     """A directional light."""
@@ -91,12 +91,8 @@ class Light:
     strength: float = setting(1.0, limits=(0.0, 4.0))
     """Multiplier of the colour."""
 
-    def __post_init__(self) -> None:
-        for name in ("azimuth", "inclination", "strength"):
-            check_type(name, getattr(self, name), float)
-        check_type("color", self.color, Sequence)
 
-
+@checked
 @dataclass(slots=True)
 class Lights:
     """Two coloured lights, the ambient light, and the specular highlight."""
@@ -117,15 +113,8 @@ class Lights:
     follow_camera: bool = True
     """Whether the directions rotate with the camera."""
 
-    def __post_init__(self) -> None:
-        for name in ("key", "rim"):
-            check_type(name, getattr(self, name), Light)
-        for name in ("ambient", "specular", "shininess", "studio"):
-            check_type(name, getattr(self, name), float)
-        for name in ("sky", "ground"):
-            check_type(name, getattr(self, name), Sequence)
 
-
+@checked
 @dataclass(slots=True)
 class DisplayOptions:
     """All render settings except scene and camera."""

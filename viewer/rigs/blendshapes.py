@@ -11,6 +11,7 @@ from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Deferred, Floats, Ints, freeze_fields, frozen, runs_of
 from viewer.rigs.bodies.offsets import DeferredOffsets, SparseOffsets
 from viewer.rigs.bodies.pose_features import Feature
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.expressions import ExpressionRules, MaterialBinds
 
 _BLOCK = 9  # number of correctives per joint in SMPL
@@ -27,6 +28,7 @@ class ShapeSpace(Protocol):
         """Return the displacement of the rest joints, (J, 3); None if a regressor moves them."""
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
     """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s."""
@@ -174,6 +176,7 @@ class BlendShapes:
         return np.zeros(self.offsets.shape) if offsets is None else _values(offsets)
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class Correctives:
     """Pose-dependent offsets of body models: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9)."""
@@ -252,6 +255,7 @@ def corrective_weights(rotations: Floats) -> Floats:
     return (rotations[1:] - np.eye(3)).reshape(-1)
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRegressor:
     """Rest joints as weighted sums of rest vertices, J_j = b_j + sum_v r_jv v."""

@@ -13,6 +13,7 @@ from viewer.errors import RigError
 from viewer.phrases import counted, printable
 from viewer.rigs.arrays import Floats, Ints, frozen
 from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.mesh import Mesh
@@ -63,6 +64,7 @@ class AttachedFigure(NamedTuple):
     skin: Skin
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Figure:
     """A character as read from its files."""

@@ -5,16 +5,16 @@ In addition, there is toon shading with rim light and outline, as in ``VRMC_mate
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from types import NoneType
+import math
+from collections.abc import Iterable
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bytes, Floats, freeze_fields
+from viewer.rigs.checked_fields import checked
 
 AlphaMode: TypeAlias = Literal["opaque", "mask", "blend"]
 ALPHA_MODES: tuple[AlphaMode, ...] = ("opaque", "mask", "blend")
@@ -28,7 +28,6 @@ TEXTURES = (
 """Fields of a material that contain textures."""
 
 Wrap: TypeAlias = Literal["clamp", "repeat", "mirror"]
-_WRAPS: tuple[Wrap, ...] = ("clamp", "repeat", "mirror")
 """Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
 MINIFICATIONS = (
     *("nearest", "linear", "nearest_mipmap_nearest"),
@@ -37,11 +36,11 @@ MINIFICATIONS = (
 """Filters of minified images, with their names in OpenGL and glTF."""
 
 OutlineMode: TypeAlias = Literal["world", "screen"]
-_OUTLINE_MODES: tuple[OutlineMode, ...] = ("world", "screen")
 """Units of outline widths: lengths, or fractions of the image height."""
 Color = tuple[float, float, float]
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """The surface appearance of some triangles.
@@ -97,26 +96,12 @@ class Material:
     """Application data of a glTF file, as parsed from JSON; None if there is none."""
 
     def __post_init__(self) -> None:
-        check_type("name", self.name, str)
-        for name in TEXTURES:
-            check_type(name, getattr(self, name), Texture, NoneType)
-        check_type("rim", self.rim, Rim, NoneType)
-        check_type("outline", self.outline, Outline, NoneType)
-        check_type("normal_scale", self.normal_scale, float)
-        check_type("shade_range", self.shade_range, Sequence)
-        _check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
         for name in ("metallic", "roughness", "occlusion_strength"):
-            _check_numbers(name, (getattr(self, name),), 1.0)
-        _check_numbers("alpha_cutoff", (self.alpha_cutoff,))
-        _check_numbers("emissive", self.emissive, count=3)
-        if self.base_color is not None:
-            _check_numbers("base_color", self.base_color, 1.0, count=4)
-        if self.shade_color is not None:
-            _check_numbers("shade_color", self.shade_color, 1.0, count=3)
-        if not np.isfinite(self.shade_range).all():
-            raise RigError(f"shade_range: expected finite numbers, found {self.shade_range}")
-        if not np.isfinite(self.normal_scale):
-            raise RigError(f"normal_scale: expected a finite number, found {self.normal_scale}")
+            _check_range(name, (getattr(self, name),), 1.0)
+        _check_range("alpha_cutoff", (self.alpha_cutoff,))
+        _check_range("emissive", self.emissive)
+        _check_range("base_color", self.base_color or (), 1.0)
+        _check_range("shade_color", self.shade_color or (), 1.0)
 
     @property
     def textures(self) -> dict[str, Texture]:
@@ -148,6 +133,7 @@ class Material:
         return None if self.base_texture is None else self.base_texture.image
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
     """An image, and its placement and sampling."""
@@ -173,9 +159,6 @@ class Texture:
     """The PNG or JPEG file that ``image`` was decoded from, if it was part of another file."""
 
     def __post_init__(self) -> None:
-        check_type("name", self.name, str)
-        check_type("uv_set", self.uv_set, int)
-        check_type("wrap", self.wrap, Sequence)
         if self.image is not None:
             freeze_fields(self, np.uint8, image=(None, None, 4))
         if self.transform is None:
@@ -185,8 +168,6 @@ class Texture:
         _check_choice("minification", self.minification, ("", *MINIFICATIONS))
         if self.uv_set < 0:
             raise RigError(f"uv_set: expected at least 0, found {self.uv_set}")
-        for side in self.wrap:
-            _check_choice("wrap", side, _WRAPS)
 
     @property
     def matrix(self) -> Floats:
@@ -200,6 +181,7 @@ class Texture:
         return np.array_equal(self.matrix, np.eye(2, 3))
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class Rim:
     """Light at the edges of a surface, added to its colour.
@@ -223,9 +205,7 @@ class Rim:
     """(r, g, b). f, linear."""
 
     def __post_init__(self) -> None:
-        numbers = (*self.color, *self.matcap_factor, self.power, self.lift, self.mix)
-        if not np.isfinite(numbers).all() or self.power < 0.0:
-            raise RigError(f"rim: expected finite numbers and an exponent of at least 0: {numbers}")
+        _check_range("power", (self.power,))
 
     @property
     def has_effect(self) -> bool:
@@ -233,6 +213,7 @@ class Rim:
         return any(self.color) or (self.matcap is not None and any(self.matcap_factor))
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
     """A line around a surface."""
@@ -248,24 +229,14 @@ class Outline:
     """Factor of the width, in the green channel."""
 
     def __post_init__(self) -> None:
-        if self.mode not in _OUTLINE_MODES:
-            raise RigError(f"outline: expected {' or '.join(_OUTLINE_MODES)}, found {self.mode}")
-        numbers = (self.width, *self.color, self.mix)
-        if not np.isfinite(numbers).all() or self.width < 0.0:
-            raise RigError(f"outline: expected finite numbers and a width of at least 0: {numbers}")
+        _check_range("width", (self.width,))
 
 
-def _check_numbers(
-    name: str, values: tuple[float, ...], most: float = float("inf"), count: int = 1
-) -> None:
-    """Raise RigError unless ``count`` numbers are finite, at least 0, and at most ``most``."""
-    check_type(name, values, Sequence)
-    if len(values) != count:
-        raise RigError(f"{name}: expected {count} numbers, found {len(values)}")
+def _check_range(name: str, values: Iterable[float], most: float = math.inf) -> None:
+    """Raise RigError unless numbers are at least 0, and at most ``most``."""
     for value in values:
-        check_type(name, value, float)
-        if not (0.0 <= value <= most and np.isfinite(value)):
-            limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
+        if not 0.0 <= value <= most:
+            limits = "at least 0" if most == math.inf else f"0 to {most:g}"
             raise RigError(f"{name}: expected {limits}, found {value}")
 
 

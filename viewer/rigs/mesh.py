@@ -10,6 +10,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields, frozen
+from viewer.rigs.checked_fields import checked
 
 if TYPE_CHECKING:
     from viewer.rigs.material import Material
@@ -26,6 +27,7 @@ _SAMPLE = 4096  # number of vertices sampled for the median
 _ROW = 64  # points per row of a reduction, see bounding_box
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Mesh:
     """An indexed triangle mesh, in the bind pose."""

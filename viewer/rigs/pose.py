@@ -7,13 +7,14 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.phrases import counted, printable
-from viewer.rigs.arrays import Floats, Ints, span
+from viewer.rigs.arrays import Floats, Ints, frozen, span
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.constraints.evaluation import constrained_matrices
 from viewer.rigs.geometry.rotation import (
     matrix_to_euler,
@@ -40,6 +41,7 @@ _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _PER_JOINT = 10  # a translation, a quaternion and three scale factors
 
 
+@checked
 @watched("values", "shape_weights")
 @dataclass(slots=True, eq=False)
 class Pose:
@@ -54,11 +56,11 @@ class Pose:
     # All numbers of the joints are one array, so that poses are copied, compared and gathered at
     # once. Its parts are views: what is assigned to them is copied.
 
-    values: Floats
+    values: Floats = field(metadata={"shape": (None,)})
     """(D + 10 J + 3,). DOFs, translations, rotations, scales and ``figure_translation``."""
     n_dofs: int
     """D."""
-    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0), metadata={"shape": (None,)})
     """(S,). Weights of the figure's blend shapes; missing trailing weights are treated as 0."""
     figure_scale: float = 1.0
     """Scale of the whole skinned figure about its origin, applied after skinning."""
@@ -71,9 +73,8 @@ class Pose:
     _key: NumberKey | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.values = np.asarray(self.values, dtype=np.float64)
         of_joints = self.values.size - self.n_dofs - 3
-        if self.values.ndim != 1 or self.n_dofs < 0 or of_joints < 0 or of_joints % _PER_JOINT:
+        if self.n_dofs < 0 or of_joints < 0 or of_joints % _PER_JOINT:
             raise RigError(
                 f"values of a pose with {counted(self.n_dofs, 'DOF')}: expected three more and "
                 f"{_PER_JOINT} per joint, found {printable(self.values.shape)}"
@@ -86,7 +87,7 @@ class Pose:
 
     @dofs.setter
     def dofs(self, values: Floats) -> None:
-        self.dofs[:] = values
+        _fill("dofs", self.dofs, values)
 
     @property
     def translations(self) -> Floats:
@@ -95,7 +96,7 @@ class Pose:
 
     @translations.setter
     def translations(self, values: Floats) -> None:
-        self.translations[:] = values
+        _fill("translations", self.translations, values)
 
     @property
     def rotations(self) -> Floats:
@@ -104,7 +105,7 @@ class Pose:
 
     @rotations.setter
     def rotations(self, values: Floats) -> None:
-        self.rotations[:] = values
+        _fill("rotations", self.rotations, values)
 
     @property
     def scales(self) -> Floats:
@@ -113,7 +114,7 @@ class Pose:
 
     @scales.setter
     def scales(self, values: Floats) -> None:
-        self.scales[:] = values
+        _fill("scales", self.scales, values)
 
     @property
     def figure_translation(self) -> Floats:
@@ -122,7 +123,7 @@ class Pose:
 
     @figure_translation.setter
     def figure_translation(self, values: Floats) -> None:
-        self.figure_translation[:] = values
+        _fill("figure_translation", self.figure_translation, values)
 
     @property
     def skinning_key(self) -> NumberKey:
@@ -163,6 +164,15 @@ class Pose:
         values, weights = unwatched("values")(self), unwatched("shape_weights")(self)
         numbers = values.copy(), self.n_dofs, weights.copy()
         return Pose(*numbers, self.figure_scale, self.skeleton)
+
+
+def _fill(name: str, array: Floats, values: ArrayLike) -> None:
+    """Set an array of a pose to values, or one row of them for all joints."""
+    try:
+        given = np.broadcast_to(np.asarray(values, dtype=np.float64), array.shape)
+    except (TypeError, ValueError):
+        raise RigError(f"{name}: expected numbers of shape {array.shape}") from None
+    array[:] = frozen(name, given, array.shape)
 
 
 class PoseArrays(NamedTuple):

@@ -19,6 +19,8 @@ from viewer.phrases import counted, printable
 from viewer.progress import report
 from viewer.rigs.arrays import Floats
 from viewer.rigs.bodies.smpl_family import ShapeSpace
+from viewer.rigs.captures.cameras import CameraImages, CameraView
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.figure import Figure, figure_pose, skeleton_points
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import Up
@@ -32,7 +34,6 @@ from viewer.rigs.watched_arrays import watched
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from viewer.rigs.captures.cameras import CameraImages, CameraView
     from viewer.rigs.captures.points import PointClip
     from viewer.rigs.motion.clip import Clip
     from viewer.rigs.motion.evaluation import Frames
@@ -63,6 +64,7 @@ class Swinging(Protocol):
         """Rotate the spring joints of an actor, already posed by its clip at a time, in place."""
 
 
+@checked
 @watched("placement")
 @dataclass(slots=True, eq=False)
 class Actor:
@@ -74,7 +76,7 @@ class Actor:
     """What ``pose`` returns; None if the figure has no skeleton."""
     clip: Motion | None = None
     """Its motion, which ``pose_actors`` evaluates."""
-    placement: Floats = field(default_factory=lambda: np.eye(4))
+    placement: Floats = field(default_factory=lambda: np.eye(4), metadata={"shape": (4, 4)})
     """(4, 4). Figure space to scene space."""
     visible: bool = True
     """Whether it is drawn."""
@@ -86,7 +88,7 @@ class Actor:
     """(r, g, b) or None. Linear, 0 to 1; None for the default colour."""
     opacity: float = 1.0
     """Below 1, the actor is drawn as one translucent layer: nothing inside it is visible."""
-    points: Floats | None = None
+    points: Floats | None = field(default=None, metadata={"shape": (None, 4)})
     """(K, 4) or None. Captured points at the current time: x, y, z, confidence."""
     is_present: bool = True
     """Whether its clip covers the current time."""
@@ -161,8 +163,6 @@ class Actor:
         return self.clip if self.clip is not None and self.clip.kind == "transforms" else None
 
     def __post_init__(self) -> None:
-        check_type("figure", self.figure, Figure)
-        check_type("own_pose", self.own_pose, Pose, NoneType)
         if self.own_pose is None and self.figure.skeleton is not None:
             self.own_pose = figure_pose(self.figure)
 
@@ -172,7 +172,8 @@ class Actor:
         if self.own_pose is None:
             raise RigError(f"{self.name} has no pose, as it has no skeleton")
         # Names of joints are those of the actor's figure, which may have been replaced.
-        self.own_pose.skeleton = self.figure.skeleton
+        if self.own_pose.skeleton is not self.figure.skeleton:
+            self.own_pose.skeleton = self.figure.skeleton
         return self.own_pose
 
     @pose.setter
@@ -360,6 +361,7 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
     return free
 
 
+@checked
 @dataclass(slots=True, eq=False, weakref_slot=True)
 class Scene:
     """Actors that are shown together, and the cameras of their capture."""
@@ -387,11 +389,6 @@ class Scene:
     in_space: Callable[[str], Scene] | None = None
     """Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
     None if there is only one space."""
-
-    def __post_init__(self) -> None:
-        check_type("actors", self.actors, Iterable)
-        for actor in self.actors:
-            check_type("actors", actor, Actor)
 
     def __repr__(self) -> str:
         count, found = len(self.actors), len(self.diagnostics)
@@ -494,7 +491,8 @@ def pose_actors(actors: Iterable[Actor], time: float | Floats, interpolate: bool
         found = clip.sample(figure.skeleton, times, interpolate)
         rows, poses = list[int](), list[Pose]()
         for row, (actor, is_present) in enumerate(zip(group, found.present.tolist(), strict=True)):
-            actor.is_present = is_present
+            if actor.is_present is not is_present:
+                actor.is_present = is_present
             if found.points is not None:
                 actor.points = found.points[row] if is_present else None
             elif is_present and actor.own_pose is not None:

@@ -10,10 +10,11 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields
+from viewer.rigs.bodies.joint_posing import JointPosing
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.memo import Memo
 
 if TYPE_CHECKING:
-    from viewer.rigs.bodies.joint_posing import JointPosing
     from viewer.rigs.constraints.constraint import Constraint
     from viewer.rigs.humanoid import Humanoid
     from viewer.rigs.springs.spring_joints import Springs
@@ -25,6 +26,7 @@ FIRST_ROTATION = 3
 """Kinds less than this are translations, all others rotations."""
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skeleton:
     """Joints as parallel arrays, parents before children."""
@@ -80,7 +82,10 @@ class Skeleton:
             freeze_fields(self, boxes=(joints, 2, 3))
         if self.auxiliary is not None:
             freeze_fields(self, np.bool_, auxiliary=(joints,))
-        limits = np.array(self.dof_limits, dtype=np.float64)
+        try:
+            limits = np.array(self.dof_limits, dtype=np.float64)
+        except (TypeError, ValueError):
+            limits = np.zeros(0)
         if limits.shape != (self.n_dofs, 2) or np.isnan(limits).any():
             raise RigError(f"dof_limits: expected shape {self.n_dofs} x 2 without NaN")
         limits.flags.writeable = False

@@ -10,11 +10,13 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.skeleton import Skeleton, shown_joint_of, shown_joints
 
 _NO_SUM = 1e-12  # minimum sum of weights that can be scaled to 1
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skin:
     """The influences of all vertices in one flat list, as stored in the file.

@@ -31,25 +31,27 @@ def watched(*names: str) -> Callable[[_Class], _Class]:
     """
 
     def decorate(cls: _Class) -> _Class:
+        # The slot itself: setting it needs no check of the class.
+        mark = vars(cls)["handed"].__set__
         for name in names:
             slot = getattr(cls, name)
             setattr(cls, f"_{name}", slot)
-            setattr(cls, name, _property_of(slot))
+            setattr(cls, name, _property_of(slot, mark))
         return cls
 
     return decorate
 
 
-def _property_of(slot: Any) -> property:
+def _property_of(slot: Any, mark: Callable[[Any, object], None]) -> property:
     # In this order, ``Watch`` misses no write of another thread either.
     def get(owner: Any) -> object:
         array = slot.__get__(owner)
-        owner.handed = object()
+        mark(owner, object())
         return array
 
     def put(owner: Any, array: object) -> None:
         slot.__set__(owner, array)
-        owner.handed = object()
+        mark(owner, object())
 
     return property(get, put)
 

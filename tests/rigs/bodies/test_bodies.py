@@ -108,6 +108,9 @@ class AnyWeights:
 
     n_weights = ROWS
 
+    def weights(self, skeleton, pose):
+        raise NotImplementedError
+
 
 def array(density: float) -> np.ndarray:
     generator = np.random.default_rng(1)

@@ -161,5 +161,5 @@ def test_deform_refuses_a_figure_without_mesh_and_an_unknown_method():
     assert str(caught.value) == "figure a has no mesh to deform"
     with pytest.raises(RigError) as caught:
         deform(Figure("a", mesh=POINT), method="magic")
-    expected = f'no skinning method "magic"; there are {len(METHODS)}: {", ".join(METHODS)}'
+    expected = f'method: no value "magic"; there are {len(METHODS)}: {", ".join(METHODS)}'
     assert str(caught.value) == expected

@@ -9,6 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints, freeze_fields
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.motion.samples import Samples
 from viewer.rigs.motion.timing import Timing
 
@@ -36,6 +37,7 @@ class PointLayout:
             raise RigError(f"limbs: expected 0 to {count - 1}, found {self.limbs.max()}")
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class PointClip:
     """A motion of points."""

@@ -22,6 +22,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.phrases import all_of
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze_fields, frozen
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.memo import Memo
 from viewer.rigs.motion.samples import Samples
 from viewer.rigs.motion.timing import DEFAULT_RATE, check_range
@@ -85,6 +86,7 @@ def _tangent(given: Tangent) -> Tangent:
     return float(given)
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Clip:
     """A motion of one skeleton."""

@@ -12,6 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints, freeze_fields
 from viewer.rigs.captures.points import PointClip
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.geometry.quaternion import slerp
 from viewer.rigs.motion.samples import Samples, joint_samples
 from viewer.rigs.motion.timing import Timing
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from viewer.rigs.skeleton import Skeleton
 
 
+@checked
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SampledClip:
     """A motion of one skeleton as frames, as captures are stored."""

@@ -15,6 +15,7 @@ from viewer.arguments import check_type
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.checked_fields import checked
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import unit
@@ -69,6 +70,7 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 """Methods that are not interpolated between others; the first is the reference."""
 
 
+@checked
 @dataclass(slots=True)
 class Skinning:
     """Skinning options; by default, weights are used as stored."""
@@ -148,10 +150,6 @@ def deform(
     how = Skinning(method) if isinstance(method, str) else method
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
-    if how.method not in METHODS:
-        from viewer.near_names import name_hint
-
-        raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
     return deformed(figure, pose, how)
 
 
