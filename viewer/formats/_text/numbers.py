@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.progress import report_bytes
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Bools, Floats
 
 LARGEST = float(np.finfo(np.float32).max)
 """Numbers beyond this become infinite on the GPU, so they are refused."""
@@ -102,9 +102,19 @@ def parse_words(data: bytes, start: int, end: int) -> Floats:
 
 def word_begins(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Return the offsets of white-space-separated words (N,)."""
-    # The subtraction wraps around, so that one comparison finds 9 to 13.
-    inked = ~((letters == 32) | (letters - np.uint8(9) < 5))
+    inked = ~are_blank(letters)
     return np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))
+
+
+def are_blank(letters: NDArray[np.uint8]) -> Bools:
+    """Return whether letters are white space: (N,)."""
+    # The subtraction wraps around, so that one comparison finds 9 to 13.
+    return (letters == 32) | (letters - np.uint8(9) < 5)
+
+
+def line_ends(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return the offsets of LF and CR (L,)."""
+    return np.flatnonzero((letters == 10) | (letters == 13))
 
 
 def _chunk_bounds(data: bytes, start: int, end: int, size: int) -> Iterator[tuple[int, int]]:

@@ -14,6 +14,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import (
     is_infinite,
     is_too_large,
+    line_ends,
     parse_numbers,
     parse_words,
     word_begins,
@@ -58,9 +59,8 @@ def read_words(data: bytes, start: int, end: int) -> Words:
     """Parse a part of a text that should contain only numbers."""
     letters = np.frombuffer(data, dtype=np.uint8, count=end - start, offset=start)
     begins = word_begins(letters)
-    breaks = np.flatnonzero((letters == 10) | (letters == 13))
     values = parse_words(data, start, end)
-    return Words(data, values, begins + start, np.searchsorted(breaks, begins))
+    return Words(data, values, begins + start, np.searchsorted(line_ends(letters), begins))
 
 
 def refuse_words(
@@ -184,9 +184,6 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
     if count % columns:
         return False
     letters = np.frombuffer(source.data, dtype=np.uint8)
-    is_space = letters <= 32  # control characters have been refused with the numbers
-    begins = np.flatnonzero(~is_space & np.concatenate([[True], is_space[:-1]]))
     # Each run of `columns` words must be on a separate line.
-    ends = np.flatnonzero((letters == 10) | (letters == 13))
-    rows = np.searchsorted(ends, begins).reshape(-1, columns)
+    rows = np.searchsorted(line_ends(letters), word_begins(letters)).reshape(-1, columns)
     return bool((rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all())

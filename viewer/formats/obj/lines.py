@@ -18,7 +18,13 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._polygons import first_known, triangles_of
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_words, to_number, word_begins
+from viewer.formats._text.numbers import (
+    are_blank,
+    line_ends,
+    parse_words,
+    to_number,
+    word_begins,
+)
 from viewer.formats._text.words import Words, refuse_words
 from viewer.phrases import counted, quoted
 from viewer.rigs.arrays import Bools, Floats
@@ -113,15 +119,15 @@ def _joined(parts: Iterator[bytes]) -> Iterator[bytes]:
 
 def _split(data: bytes, base: int) -> Lines:
     letters = np.frombuffer(data, dtype=np.uint8)
-    ends = np.flatnonzero((letters == 10) | (letters == 13)) + 1
+    ends = line_ends(letters) + 1
     starts = np.concatenate([[0], ends[:-1]])
-    indented = np.flatnonzero(_is_blank(letters[starts]))
+    indented = np.flatnonzero(are_blank(letters[starts]))
     if len(indented):
-        inked = np.append(np.flatnonzero(~_is_blank(letters)), len(letters))
+        inked = np.append(np.flatnonzero(~are_blank(letters)), len(letters))
         first = inked[np.searchsorted(inked, starts[indented])]
         starts[indented] = np.minimum(first, ends[indented] - 1)  # the end of an empty line
     first, second, third = (letters.take(starts + k, mode="clip") for k in range(3))
-    ends_at_1, ends_at_2 = _is_blank(second), _is_blank(third)
+    ends_at_1, ends_at_2 = are_blank(second), are_blank(third)
     is_v = first == ord("v")
     known = {
         "v": is_v & ends_at_1,
@@ -130,16 +136,11 @@ def _split(data: bytes, base: int) -> Lines:
         # "fo" is an obsolete keyword for "f".
         "f": (first == ord("f")) & (ends_at_1 | ((second == ord("o")) & ends_at_2)),
     }
-    rest = ~(_is_blank(first) | (first == ord("#")))
+    rest = ~(are_blank(first) | (first == ord("#")))
     for chosen in known.values():
         rest &= ~chosen
     of = {keyword: np.flatnonzero(chosen) for keyword, chosen in known.items()}
     return Lines(base, data, letters, starts, ends, of, np.flatnonzero(rest))
-
-
-def _is_blank(letters: _Letters) -> Bools:
-    # The subtraction wraps around, so that one comparison finds the characters 9 to 13.
-    return (letters == 32) | (letters - np.uint8(9) < 5)
 
 
 def number_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> _NumberRows:

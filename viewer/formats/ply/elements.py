@@ -22,7 +22,7 @@ from viewer.errors import FormatError
 from viewer.formats._polygons import triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
-from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
+from viewer.formats._text.numbers import line_ends, parse_numbers, parse_words, word_begins
 from viewer.formats._text.words import number_key
 from viewer.phrases import brief, counted, listed, quoted
 from viewer.progress import report_bytes
@@ -697,5 +697,5 @@ def _counts(data: bytes, start: int, end: int) -> tuple[NDArray[np.int32], NDArr
     """Return the number of words in each line of a piece, and the offsets of line ends in it."""
     letters = np.frombuffer(data, dtype=np.uint8, count=end - start, offset=start)
     begins = word_begins(letters)
-    ends = np.append(np.flatnonzero((letters == 10) | (letters == 13)), len(letters))
+    ends = np.append(line_ends(letters), len(letters))
     return np.diff(np.searchsorted(begins, ends), prepend=0).astype(np.int32), ends
