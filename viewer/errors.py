@@ -28,9 +28,15 @@ __all__ = [
     "RigError",
     "UnsupportedFormatError",
     "ViewerError",
+    "reason_of",
 ]
 
 _LONGEST = 1000  # maximum length of a message that contains names, characters
+
+
+def reason_of(problem: Exception) -> str:
+    """Return why a file could not be read or written, in the words of the system if there are."""
+    return printable(getattr(problem, "strerror", None) or problem)
 
 
 class ViewerError(Exception):
@@ -115,3 +121,8 @@ class OutputError(ViewerError):
     """A result could not be written; existing files are unchanged."""
 
     exit_code = 5
+
+    @classmethod
+    def at(cls, path: str | Path, problem: Exception) -> Self:
+        """Return the error for a file or folder that could not be written."""
+        return cls(f"{printable(path, 300)}: {reason_of(problem)}")

@@ -48,8 +48,7 @@ def write_stdout(path: str | Path, data: bytes) -> None:
     except BrokenPipeError:
         raise
     except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None
+        raise OutputError.at(path, problem) from None
 
 
 def summary_stream(output: str | Path) -> TextIO:

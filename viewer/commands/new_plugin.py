@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
-            raise OutputError(f"{printable(path, 300)}: {problem.strerror or problem}") from None
+            raise OutputError.at(path, problem) from None
         save_text(path, text)
     print(f"{printable(folder)}: a plug-in that reads .off, shows heights and checks meshes")
     print(f"  pip install -e {printable(folder)}      # viewer doctor lists it")

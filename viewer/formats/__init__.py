@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
-from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.errors import FormatError, UnsupportedFormatError, reason_of
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source, unreadable
 from viewer.phrases import listed, printable
@@ -314,7 +314,7 @@ def _detect_folder(source: Source) -> str:
     try:
         names = {path.name for path in source.path.iterdir()}
     except OSError as problem:
-        raise unreadable(source.path, problem.strerror or problem) from None
+        raise unreadable(source.path, reason_of(problem)) from None
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key

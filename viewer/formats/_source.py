@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from viewer.diagnostics import Collector, Diagnostic, Part, Phrase, note, wording
-from viewer.errors import FormatError
+from viewer.errors import FormatError, reason_of
 from viewer.formats._text.numbers import word_begins
 from viewer.interrupts import raising
 from viewer.phrases import Remedy, optional
@@ -516,9 +516,8 @@ def _read_part(path: Path, start: int, size: int) -> bytes:
 
 
 def _unreadable(path: Path, problem: Exception) -> FormatError:
-    reason = getattr(problem, "strerror", None) or problem
     near = _near_files(path) if isinstance(problem, FileNotFoundError) else ""
-    return unreadable(path, reason, near)
+    return unreadable(path, reason_of(problem), near)
 
 
 def unreadable(path: Path, reason: object, near: str = "") -> FormatError:

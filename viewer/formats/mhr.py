@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import wording
+from viewer.errors import reason_of
 from viewer.formats._archive.checking import (
     archive_of,
     are_indices,
@@ -120,7 +121,7 @@ def _file_names(folder: Path) -> list[str]:
     try:
         return [path.name for path in folder.iterdir()]
     except OSError as problem:
-        raise unreadable(folder, problem.strerror or problem) from None
+        raise unreadable(folder, reason_of(problem)) from None
 
 
 def _opened(source: Source, keys: str) -> Archive:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from viewer.errors import OutputError
+from viewer.errors import OutputError, reason_of
 from viewer.phrases import printable
 from viewer.streams import is_stdout, require_stdout
 
@@ -44,7 +44,7 @@ def check_targets(
         try:
             identity = _checked(file, opened, force, hint, folders)
         except (OSError, ValueError, RuntimeError) as problem:
-            raise _refusal(file, getattr(problem, "strerror", None) or str(problem)) from None
+            raise _refusal(file, reason_of(problem)) from None
         if identity is not None:
             other = written.setdefault(identity, file)
             if other is not file:
@@ -68,7 +68,7 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
             raise _refusal(there, "expected a folder, found a file")
         _check_folder(folder, there, set())
     except (OSError, ValueError, RuntimeError) as problem:
-        raise _refusal(folder, getattr(problem, "strerror", None) or str(problem)) from None
+        raise _refusal(folder, reason_of(problem)) from None
 
 
 def _checked(

@@ -115,8 +115,7 @@ def save_parts(
             _replace(path.resolve(), parts, stat.S_IMODE(mode))
             note_output(path)
     except (OSError, ValueError, RuntimeError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None
+        raise OutputError.at(path, problem) from None
 
 
 class Replacement:
@@ -138,8 +137,7 @@ class Replacement:
 
     def error(self, problem: Exception) -> OutputError:
         """Return a one-line error with the path."""
-        reason = getattr(problem, "strerror", None) or problem
-        return OutputError(f"{printable(self.path, 300)}: {printable(reason)}")
+        return OutputError.at(self.path, problem)
 
     def begin(self) -> Path:
         """Create the temporary file, with the target's suffix, and return its path."""
@@ -243,8 +241,7 @@ def _keep_copy(path: Path, copies: _Copies) -> None:
                 raise
             copies[target] = Path(name)
     except (OSError, ValueError, RuntimeError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        raise OutputError(f"{printable(path, 300)}: {reason}") from None
+        raise OutputError.at(path, problem) from None
 
 
 def _mode(target: Path) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from viewer.errors import OutputError
+from viewer.errors import OutputError, reason_of
 from viewer.media.saving import save_bytes
 from viewer.phrases import printable
 
@@ -49,8 +49,7 @@ def load_kept(
         with path.open("rb") as stream:
             data = stream.read(_LARGEST + 1)
     except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or problem
-        say(f"{shown}: {reason}; the defaults are used")
+        say(f"{shown}: {reason_of(problem)}; the defaults are used")
         return usual
     try:
         if len(data) > _LARGEST:
@@ -61,7 +60,8 @@ def load_kept(
     try:
         path.replace(aside)
     except OSError as problem:
-        say(f"{shown} is damaged and cannot be renamed ({problem.strerror}); the defaults are used")
+        why = reason_of(problem)
+        say(f"{shown} is damaged and cannot be renamed ({why}); the defaults are used")
     else:
         say(f"{shown} was damaged: it is now called {aside.name}, and the defaults are used")
     return usual
@@ -73,7 +73,7 @@ def save_kept(path: Path, data: bytes) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         save_bytes(path, data)
     except OSError as problem:
-        return f"{printable(path, 300)}: {problem.strerror}"
+        return str(OutputError.at(path, problem))
     except OutputError as problem:
         return str(problem)
     return ""

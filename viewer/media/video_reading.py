@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
-from viewer.errors import FormatError, ViewerError
+from viewer.errors import FormatError, ViewerError, reason_of
 from viewer.phrases import Remedy
 from viewer.rigs.arrays import Bytes
 
@@ -53,7 +53,7 @@ class VideoFrames:
             raise FormatError.fault(
                 "F001.video: unreadable video: {reason}",
                 path,
-                reason=str(problem.strerror or problem),
+                reason=reason_of(problem),
             ) from None
         try:
             self._container = self._errors.open(str(path))

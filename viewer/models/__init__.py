@@ -61,7 +61,7 @@ def save_model_folder(folder: str | Path) -> Path:
     try:
         _settings_file().parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise OutputError(f"{printable(_settings_file(), 300)}: {problem.strerror}") from None
+        raise OutputError.at(_settings_file(), problem) from None
     text = json.dumps({"folder": str(path.resolve())}, indent=1)
     with deferred():  # deferred signals are re-raised: this is a setting, not output
         save_bytes(_settings_file(), text.encode("utf-8", "replace"))

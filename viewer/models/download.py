@@ -47,7 +47,7 @@ def add_model(name: str) -> Path:
             target = folder / wheel.name
             os.replace(wheel, target)  # noqa: PTH105, as in the other writers
     except OSError as problem:
-        raise OutputError(f"{printable(folder, 300)}: {problem.strerror or problem}") from None
+        raise OutputError.at(folder, problem) from None
     return target
 
 

@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
+from viewer.errors import reason_of
 from viewer.formats import all_suffixes
 from viewer.phrases import printable
 
@@ -72,7 +73,7 @@ class FileDialog:
             paths = list(folder.iterdir())
             folders = {path for path in paths if path.is_dir()}
         except OSError as problem:
-            self.problem = f"{printable(folder)}: {problem.strerror}"
+            self.problem = f"{printable(folder)}: {reason_of(problem)}"
             return
         self.entries = sorted(paths, key=lambda path: (path not in folders, path.name.lower()))
         self.folder, self.folders, self.problem = folder, folders, ""
@@ -87,7 +88,7 @@ class FileDialog:
             if path.is_file():
                 return path
         except (OSError, RuntimeError) as problem:  # the name is too long, or there is no such user
-            self.problem = f"{printable(text)}: {getattr(problem, 'strerror', None) or problem}"
+            self.problem = f"{printable(text)}: {reason_of(problem)}"
             return None
         self.enter(path)
         return None

@@ -10,7 +10,7 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState, shows_errors
-from viewer.errors import ViewerError
+from viewer.errors import ViewerError, reason_of
 from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
 from viewer.progress import report
@@ -70,4 +70,4 @@ def save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
     except ViewerError as problem:
         state.error = str(problem)
     except OSError as problem:
-        state.error = f"the current folder: {problem.strerror}"
+        state.error = f"the current folder: {reason_of(problem)}"

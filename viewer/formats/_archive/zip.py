@@ -16,7 +16,7 @@ from typing import IO, cast, overload
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note, wording
-from viewer.errors import FormatError
+from viewer.errors import FormatError, reason_of
 from viewer.formats._source import Source, phrased, too_large, unreadable
 from viewer.phrases import printable
 
@@ -153,7 +153,7 @@ class StoredFile:
                 self._stamp = status.st_size, status.st_mtime_ns
         except (OSError, ValueError) as problem:
             if self._data is None:
-                raise unreadable(self.path, _reason(problem)) from None
+                raise unreadable(self.path, reason_of(problem)) from None
         if self._stamp is None:
             self.size = len(self._data or b"")
         else:
@@ -176,7 +176,7 @@ class StoredFile:
         try:
             file = _Reader(self.path.open("rb", buffering=0))
         except OSError as problem:
-            raise unreadable(self.path, _reason(problem)) from None
+            raise unreadable(self.path, reason_of(problem)) from None
         status = os.fstat(file.fileno())
         if (status.st_size, status.st_mtime_ns) != self._stamp:
             file.close()
@@ -223,10 +223,6 @@ def value_fault(
     """Return an error in the value of a key."""
     values = {"item": printable(key, 60), "problem": phrased(problem, values)}
     return FormatError(note(wording.ARCHIVE_VALUE, path, **values))
-
-
-def _reason(problem: Exception) -> object:
-    return getattr(problem, "strerror", None) or problem
 
 
 class FileWindow:

@@ -29,7 +29,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
-from viewer.errors import FormatError
+from viewer.errors import FormatError, reason_of
 from viewer.formats._source import Source, remark_on
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
@@ -388,8 +388,7 @@ class ImageFolders:
         except FormatError as problem:
             self._faults[path] = str(problem)
         except OSError as problem:
-            reason = str(problem.strerror or problem)
-            self._faults[path] = str(note(wording.PICTURE, path, reason=reason))
+            self._faults[path] = str(note(wording.PICTURE, path, reason=reason_of(problem)))
         return None
 
     def size_of(self, camera: str) -> tuple[int, int] | None:

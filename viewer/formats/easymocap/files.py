@@ -14,7 +14,7 @@ from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.errors import FormatError
+from viewer.errors import FormatError, reason_of
 from viewer.formats._archive.values import describe
 from viewer.formats._published_models import refuse_models
 from viewer.formats._source import InvalidValueError, Source, too_large, unreadable
@@ -110,7 +110,7 @@ def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
                 elif is_frame:
                     others.append(entry.name)
     except OSError as problem:
-        name, reason = printable(folder.name, 100), str(problem.strerror or problem)
+        name, reason = printable(folder.name, 100), reason_of(problem)
         raise source.fault(
             "F001.capture-folder: {item}: cannot be read: {reason}", item=name, reason=reason
         ) from None
@@ -304,7 +304,7 @@ def _text(path: str, max_size: int) -> str:
     try:
         data = _read(path, max_size)
     except OSError as problem:
-        raise unreadable(Path(path), problem.strerror or problem) from None
+        raise unreadable(Path(path), reason_of(problem)) from None
     try:
         return data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as problem:

@@ -407,5 +407,5 @@ def _save_texture(material: Material, folder: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise OutputError(f"{printable(path.parent, 300)}: {problem.strerror}") from None
+        raise OutputError.at(path.parent, problem) from None
     save_image(path, material.image)

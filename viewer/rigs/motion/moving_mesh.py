@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.errors import OutputError, RigError
+from viewer.errors import OutputError, RigError, reason_of
+from viewer.phrases import file_size
 from viewer.progress import report
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -85,8 +86,8 @@ def room_for(n_frames: int, n_vertices: int) -> Floats:
             return np.memmap(stream, np.float64, "w+", shape=shape)
     except OSError as problem:
         raise OutputError(
-            f"{tempfile.gettempdir()}: {n_bytes / 1e9:.1f} GB for the vertices of {n_frames} "
-            f"frames: {problem.strerror or problem}"
+            f"{tempfile.gettempdir()}: {file_size(n_bytes)} for the vertices of {n_frames} "
+            f"frames: {reason_of(problem)}"
         ) from None
 
 
