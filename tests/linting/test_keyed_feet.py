@@ -38,9 +38,19 @@ def serious(findings: list[Finding]) -> list[str]:
     return [finding.code for finding in findings if finding.severity == "warning"]
 
 
-def test_body_that_skates_is_a_warning():
-    # 1.2 m in 2 s, with both feet on the ground.
-    assert serious(moved({0: along(2, 0.6 * _K / RATE)})) == ["C007"]
+@pytest.mark.parametrize("speed", [0.6, 0.25, 0.12])
+@pytest.mark.parametrize("sways", [0.0, 0.02])
+def test_body_that_skates_is_a_warning_however_slowly(speed, sways):
+    # For 2 s, with both feet on the ground, which stand below 0.08 and swing above 0.2 times the
+    # size of 1.6 m a second. The hips sway by 20 mm a second.
+    sway = along(0, sways * np.sin(2.0 * np.pi * _K / RATE) / (2.0 * np.pi))
+    skate = along(2, speed * _K / RATE)
+    assert serious(moved({0: skate + sway, 3: -sway, 6: -sway})) == ["C007"]
+
+
+def test_standing_body_that_shifts_its_weight_does_not_skate():
+    shift = along(2, 0.12 * _K / RATE)
+    assert moved({0: shift, 3: -shift, 6: -shift}) == []
 
 
 def test_foot_shifted_under_a_body_that_stays_is_a_note():

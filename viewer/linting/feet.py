@@ -13,6 +13,8 @@ from viewer.phrases import counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.contacts import (
+    Contact,
+    FootPath,
     foot_contacts,
     half_window,
     mean_speeds,
@@ -38,6 +40,8 @@ _EXACT, _MOVES = 0.003, 0.03  # sizes per second: of a held foot at most, of the
 _HELD = 0.5  # minimum fraction of the rows in which a foot stands while the body moves
 _ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
 _WITH_BODY = 0.1  # maximum difference of the velocities of foot and body, relative to the foot's
+_ALONG_GROUND = 0.5  # the same along the ground, of feet that are slow: the body also sways
+_GLIDES = 0.08  # minimum distance, in sizes, of a foot that stands: feet of captures creep a little
 _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
 # Floors of whole motions, as fractions of the figure's height
 _BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
@@ -262,7 +266,8 @@ def _slipped(
     slips = 1.0 if ground is None else ground.slips
     speeds = np.stack([slowest_points(path, *how) for path in paths], axis=1)
     stands = np.zeros(speeds.shape, dtype=np.bool_)
-    for foot, contacts in enumerate(foot_contacts(paths, *how, slips=slips)):
+    found = foot_contacts(paths, *how, slips=slips)
+    for foot, contacts in enumerate(found):
         for contact in contacts:
             stands[contact.start : contact.stop, foot] = True
     touches = (np.abs(heights) < limits.TOUCHES * track.body) & track.present[:, None]
@@ -276,6 +281,11 @@ def _slipped(
     body = track.positions[:, travelling_joints(track, subject.actor.figure.require_skeleton())[-1]]
     glides = np.all([_moves_with(path.heel, body) for path in track.paths], axis=0)
     slides = _sliding(speeds / track.body, touches & ~stands, stands, glides, step)
+    slides |= _carried_slowly(track, body, speeds, touches & ~stands, axis_vector(subject.up))
+    for foot, contacts in enumerate(found):
+        for contact in contacts:
+            if _drifts(paths[foot], contact, track.body, axis_vector(subject.up)):
+                slides[contact.start : contact.stop, foot] = True
     # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
@@ -304,6 +314,18 @@ def _slipped(
         times=track.times[each],
         at=("frames", fastest),
     )
+
+
+def _drifts(path: FootPath, contact: Contact, size: float, up: Floats) -> bool:
+    """Return whether a foot that stands is carried along by its hip, however slowly."""
+    rows = slice(contact.start, contact.stop)
+    across = np.eye(3) - np.outer(up, up)
+    # The end of the foot that moves least: it may turn about the other one.
+    ways = [(point[rows][-1] - point[rows][0]) @ across for point in (path.toe, path.heel)]
+    way = min(ways, key=lambda each: float(np.linalg.norm(each)))
+    length = float(np.linalg.norm(way))
+    hip = path.hip[rows][-1] - path.hip[rows][0]
+    return length > _GLIDES * size and float(hip @ way) > _ALONG * length**2
 
 
 def _drifting(
@@ -347,11 +369,23 @@ def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
     return carried > _ALONG * lengths.sum() and carried > _CARRIED * height * track.scale
 
 
-def _moves_with(foot: Floats, body: Floats) -> Bools:
+def _carried_slowly(track: Track, body: Floats, speeds: Floats, low: Bools, up: Floats) -> Bools:
+    """Return where low feet (F, N) are too slow to swing, and all move along with the body."""
+    # Of a body that stands or walks, at least one foot stays behind.
+    across = np.eye(3) - np.outer(up, up)
+    with_body = [
+        _moves_with(path.heel @ across, body @ across, _ALONG_GROUND) for path in track.paths
+    ]
+    is_slow = (speeds > limits.SLOW * track.body) & (speeds < limits.FAST * track.body)
+    result: Bools = low & is_slow & np.all(with_body, axis=0)[:, None]
+    return result
+
+
+def _moves_with(foot: Floats, body: Floats, most: float = _WITH_BODY) -> Bools:
     """Return the frames (F,) in which a foot moves as the body does: it does not swing."""
     steps, body_steps = np.gradient(foot, axis=0), np.gradient(body, axis=0)
     apart = np.linalg.norm(steps - body_steps, axis=1)
-    result: Bools = apart < _WITH_BODY * np.linalg.norm(steps, axis=1)
+    result: Bools = apart < most * np.linalg.norm(steps, axis=1)
     return result
 
 
