@@ -118,9 +118,9 @@ def _keep_inside(folder, monkeypatch):
     for module, name in ((posing, "save_pose"), (posing, "save_export")):
         save = getattr(module, name)
 
-        def save_inside(state, path, save=save):
+        def save_inside(state, path, *how, save=save):
             if path.resolve().is_relative_to(folder.resolve()):
-                save(state, path)
+                save(state, path, *how)
 
         monkeypatch.setattr(module, name, save_inside)
 

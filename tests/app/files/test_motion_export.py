@@ -429,6 +429,35 @@ def test_page_gets_its_caption_and_divider_in_the_dialog(crowd, tmp_path):
     assert crowd.state.error == "" and [*(tmp_path / "pose").glob("*.obj")]
 
 
+@pytest.mark.parametrize("suffix", [".html", ".glb", ".obj"])
+def test_still_figures_are_exported_together(drive, rig, tmp_path, suffix):
+    first, second = viewer.load(*rig)[0], viewer.load(*rig)[0]
+    first.clip = second.clip = None
+    second.placement[0, 3] = 2.0
+    hand = drive(scene=Scene([first, second]), size=(1000, 700), samples=1)
+    hand.menu("menu File", "Export…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step(2)
+    _choose_format(hand, suffix)
+    hand.step(2)
+    if suffix == ".obj":  # holds one figure
+        assert "Actors##exported" not in hand.state.item_rects
+    else:
+        hand.pick("Actors##exported", 0)
+        hand.step(2)
+    if suffix == ".html":
+        hand.click("Divider")
+    hand.click("Save###Save")
+    hand.finish_job()
+    assert hand.state.error == ""
+    (path,) = tmp_path.glob(f"*{suffix}")
+    if suffix == ".html":
+        page = path.read_text("utf-8")
+        assert '"wipes":true' in page and len(re.findall('"name":"tiny"', page)) >= 2
+    else:
+        assert len(viewer.load(path)) == (2 if suffix == ".glb" else 1)
+
+
 @pytest.fixture
 def paused(monkeypatch):
     """Pause the export of ``.obj`` files before anything is written."""

@@ -57,10 +57,10 @@ _COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
 
 
 @dataclass(slots=True)
-class _Selection:
-    """Whether to export all actors' motions or only the selected actor's, and how."""
+class Chosen:
+    """Whether to export all actors or only the selected one, and how."""
 
-    everyone: bool
+    everyone: bool = False
     options: ExportOptions = field(default_factory=ExportOptions)
 
 
@@ -79,7 +79,7 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     """Open the dialog; ``suffix``: that of the suggested file, the first format's if empty."""
     moving = _moving_actors(state)
     asks = len(moving) > 1 or state.actor not in moving
-    selection = _Selection(asks)
+    selection = Chosen(asks)
     first = _first(state, selection)
     # The number of each person is appended to the name if there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
@@ -96,23 +96,17 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     )
 
 
-def _first(state: AppState, selection: _Selection) -> Actor:
+def _first(state: AppState, selection: Chosen) -> Actor:
     """Return the first actor whose motion is exported."""
     return _moving_actors(state)[0] if selection.everyone else state.actor
 
 
-def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> None:
+def _draw_more(state: AppState, dialog: FileDialog, selection: Chosen) -> None:
     """Draw the choice of actors and format."""
     moving = _moving_actors(state)
     if len(moving) > 1 or state.actor not in moving:
-        whose = {"all": f"all {len(moving)} actors"}
-        if state.actor in moving:
-            whose["one"] = f"only {printable(state.actor.name, 60)}"
-        selection.everyone = (
-            choice(state, "Actors##exported", "all" if selection.everyone else "one", whose, 12.0)
-            == "all"
-        )
-        is_one = dialog.suffix == "" or _is_one_file(Path(f"motion{dialog.suffix}"))
+        _draw_actors(state, selection, len(moving), state.actor in moving)
+        is_one = dialog.suffix == "" or is_one_file(Path(f"motion{dialog.suffix}"))
         explain("one file for all" if is_one else "one file per actor, numbered by actor")
     actor = _first(state, selection)
     _draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))
@@ -126,6 +120,15 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
     why = "" if "safe_names" in known else "for .bvh only"
     options.safe_names = checkbox(state, "Safe names", options.safe_names, why)
     explain(SAFE_NAMES, why)
+
+
+def _draw_actors(state: AppState, selection: Chosen, count: int, has_own: bool = True) -> None:
+    """Draw the choice between all actors, so many, and the selected one."""
+    whose = {"all": f"all {count} actors"}
+    if has_own:
+        whose["one"] = f"only {printable(state.actor.name, 60)}"
+    now = "all" if selection.everyone else "one"
+    selection.everyone = choice(state, "Actors##exported", now, whose, 12.0) == "all"
 
 
 def options_for(state: AppState, path: Path, options: ExportOptions | None) -> ExportOptions:
@@ -192,7 +195,7 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     return [*dict.fromkeys(file for each in paths for file in files_at(kinds[0], each))]
 
 
-def _is_one_file(path: Path) -> bool:
+def is_one_file(path: Path) -> bool:
     """Return whether a name selects one file, or folder, with all actors."""
     kinds = [kind for kind in exporters_at(path) if kind.stores_motion]
     return any(is_together(kind, path, ExportOptions()) for kind in kinds)
@@ -221,7 +224,7 @@ def save_motion(
         check_folder_target(files[0], state.inputs, force=True)
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
     options = replace(options_for(state, path, options), kind=kind)
-    has_still = everyone and "pose" in EXPORTERS[kind].stores and _is_one_file(path)
+    has_still = everyone and "pose" in EXPORTERS[kind].stores and is_one_file(path)
     still = [each for each in state.scene.actors if has_still and each.clip is None]
     known, written = state.of(SavedWork), [one for each in motions for one in each.saved]
     written += [
@@ -248,7 +251,7 @@ def _motions(
 ) -> tuple[list[_Motion], list[Actor], list[Diagnostic]]:
     """Return the motions to write, all actors that count in names, and notes about omitted ones."""
     actors = _moving_actors(state) if everyone else [state.actor]
-    paths = [path] * len(actors) if _is_one_file(path) else motion_paths(path, actors)
+    paths = [path] * len(actors) if is_one_file(path) else motion_paths(path, actors)
     motions, selected, notes = list[_Motion](), [*actors], list[Diagnostic]()
     for index, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
@@ -359,7 +362,7 @@ def _of_pose(kind: Exporter) -> Exporter:
     return replace(kind, title=title, keeps=", ".join(kept), omits=f"motion, {kind.omits}")
 
 
-def draw_pose_formats(state: AppState, dialog: FileDialog, options: ExportOptions) -> None:
+def draw_pose_formats(state: AppState, dialog: FileDialog, selection: Chosen) -> None:
     """Draw the list of formats of poses, and the options of the chosen one."""
     record = state.actor.figure.record
     is_vrm = record is not None and record.vrm is not None
@@ -368,8 +371,15 @@ def draw_pose_formats(state: AppState, dialog: FileDialog, options: ExportOption
     missing = [suffix for suffix, kind in formats.items() if "meta" in kind.options and not is_vrm]
     _draw_formats(state, dialog, formats, dict.fromkeys(missing, why))
     suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
-    if suffix in formats and "page" in formats[suffix].options:
-        options.page = draw_page(state, options.page, 1)
+    if suffix not in formats:
+        return
+    count = len(state.scene.actors)
+    if count > 1 and is_one_file(Path(f"pose{suffix}")):
+        _draw_actors(state, selection, count)
+        explain("in their current poses, one file for all")
+    if "page" in formats[suffix].options:
+        shown = count if selection.everyone else 1
+        selection.options.page = draw_page(state, selection.options.page, shown)
 
 
 def _draw_formats(

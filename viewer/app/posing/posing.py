@@ -13,7 +13,14 @@ from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.files.files import ask_where_to_write
-from viewer.app.files.motion_export import N_ROWS, draw_pose_formats, options_for, pose_formats
+from viewer.app.files.motion_export import (
+    N_ROWS,
+    Chosen,
+    draw_pose_formats,
+    is_one_file,
+    options_for,
+    pose_formats,
+)
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
@@ -28,7 +35,7 @@ from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.posing.pose_record import record_of
 from viewer.rigs.posing.pose_vector import write_vector
 from viewer.rigs.retargeting.mirror import mirror_pose
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, Scene
 
 PoseTool: TypeAlias = Literal["select", "rotate", "move"]
 TOOLS: dict[PoseTool, tuple[str, str, str]] = {
@@ -224,33 +231,42 @@ def save_pose(state: AppState, path: Path) -> None:
 
 
 def ask_for_export(state: AppState) -> None:
-    """Ask where to export the chosen actor in its current pose, by default with an edited rig."""
+    """Ask where to export actors in their current poses, by default with an edited rig."""
     suffixes = tuple(pose_formats())
     suffix = ".glb" if state.actor.figure in state.of(SavedWork).edited else ".obj"
-    options = ExportOptions()
+    chosen = Chosen()
     ask_where_to_write(
         state,
-        lambda state, path: save_export(state, path, options),
+        lambda state, path: save_export(state, path, chosen.options, chosen.everyone),
         "Export",
         suffixes,
         f"{file_stem(state.actor.name)}{suffix}",
-        more=lambda state, dialog: draw_pose_formats(state, dialog, options),
-        more_rows=N_ROWS + 1.5,
+        more=lambda state, dialog: draw_pose_formats(state, dialog, chosen),
+        more_rows=N_ROWS + (3.0 if len(state.scene.actors) > 1 else 1.5),
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 
 
 @shows_errors
-def save_export(state: AppState, path: Path, options: ExportOptions | None = None) -> None:
-    """Write the chosen actor in its current pose for other programs, in the background."""
-    files = files_written(path)
-    # Edits made during the export must not change the written pose.
-    actor = upright_actor(state.scene, state.actor).copy()
-    how = options_for(state, path, options)
-    act, saved = lambda: export(actor, path, options=how), _saved(state.actor)
+def save_export(
+    state: AppState, path: Path, options: ExportOptions | None = None, everyone: bool = False
+) -> None:
+    """Write the chosen actor in its current pose for other programs, in the background.
+
+    Formats that hold several figures may contain ``everyone``, placed as in the scene.
+    """
+    files, how = files_written(path), options_for(state, path, options)
+    actors = state.scene.actors if everyone and is_one_file(path) else [state.actor]
+    # Edits made during the export must not change the written poses.
+    if len(actors) > 1:
+        scene = Scene([], world_up=state.scene.up)
+        selection: Actor | Selection = Selection([Part(each.copy()) for each in actors], scene)
+    else:
+        selection = upright_actor(state.scene, state.actor).copy()
+    saved = [each for actor in actors for each in _saved(actor)]
     if path.suffix.lower() in _RIGS:
-        saved = [*saved, state.actor.figure]
-    save_in_background(state, act, files, saved=saved)
+        saved += [actor.figure for actor in actors]
+    save_in_background(state, lambda: export(selection, path, options=how), files, saved=saved)
 
 
 def _saved(actor: Actor) -> list[object]:
