@@ -180,16 +180,16 @@ def test_largest_float32_is_the_limit():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "word", [b"9" * 5_000_000 + b"x", b"0." + b"0" * 5_000_000 + b"e", b"." * 5_000_000]
+    "word", [b"9" * 2_000_000 + b"x", b"0." + b"0" * 2_000_000 + b"e", b"." * 2_000_000]
 )
-def test_word_of_5_mb_is_refused_in_linear_time(word):
+def test_word_of_2_mb_is_refused_in_linear_time(word):
     assert to_number(word) is None
     assert parse_numbers(b"1 " + word, 0, len(word) + 2)[1] == 1
 
 
-def test_number_of_5_mb_is_read():
-    assert parsed("0." + "0" * 5_000_000 + "1") == ([5e-324], -1)
-    assert parsed("0" * 5_000_000 + "7") == ([7.0], -1)
+def test_number_of_2_mb_is_read():
+    assert parsed("0." + "0" * 2_000_000 + "1") == ([5e-324], -1)
+    assert parsed("0" * 2_000_000 + "7") == ([7.0], -1)
 
 
 @pytest.mark.parametrize("word", ["1e-400", "1e-324", ".0001e-330f", "0." + "0" * 400 + "1"])
