@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from imgui_bundle import imgui
 
 from viewer.app.core.messages import message_line
@@ -46,9 +48,10 @@ def draw_interface(state: AppState) -> None:
         draw_menus(state)
         dock = draw_dock(state)
         leading = ""
-        for name, panel in all_panels().items():
+        panels = all_panels()
+        for name, panel in panels.items():
             if is_open(state, name) and not no_panel(state, panel.needs):
-                appears = _draw_panel(state, name, panel)
+                appears = _draw_panel(state, name, panels)
                 leading = panel.title if appears and panel.leads else leading
         for fronts in (state.of(Layout).fronts, state.of(ShownPanels).fronts):
             for title in fronts:
@@ -70,12 +73,13 @@ def draw_interface(state: AppState) -> None:
     _draw_error(state)
 
 
-def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
-    """Draw one panel; return whether it has just appeared."""
+def _draw_panel(state: AppState, name: str, panels: Mapping[str, Panel]) -> bool:
+    """Draw one of the panels; return whether it has just appeared."""
+    panel = panels[name]
     # A panel that appears together with a figure must not cover other panels.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
-    for other in all_panels().values():
+    for other in panels.values():
         if other.place != panel.place or other is panel:
             continue
         window = imgui.internal.find_window_by_name(other.title)

@@ -6,6 +6,7 @@ first use.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
 from importlib import import_module
 from types import ModuleType
@@ -74,10 +75,13 @@ PANELS = {
 """Panels in the order in which they are docked and listed in the menu."""
 
 
-def all_panels() -> dict[str, Panel]:
+def all_panels() -> Mapping[str, Panel]:
     """Return ``PANELS`` with those of plug-ins, which are closed until the user opens them."""
+    added = added_to("panels", PANELS)
+    if not added:
+        return PANELS
     found = dict(PANELS)
-    for plugin in added_to("panels", PANELS):
+    for plugin in added:
         title = f"{plugin.name} ({plugin.distribution})"
         found[plugin.name] = Panel("", title, "right 3", on_demand=True)
     return found
@@ -156,7 +160,7 @@ class Layout:
 def is_open(state: AppState, name: str) -> bool:
     """Return whether a panel is open; it is drawn only if it has something to show."""
     shown = state.of(ShownPanels)
-    if all_panels()[name].on_demand:
+    if (PANELS.get(name) or all_panels()[name]).on_demand:
         return name in shown.opened
     return name not in shown.closed
 

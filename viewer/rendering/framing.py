@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -82,23 +83,24 @@ def seen_aspect(camera: Camera, points: Floats) -> float:
     return wide / high if wide > 0.0 and high > 0.0 else 1.0
 
 
-def _looked_at(recording: Recording) -> list[int]:
+def _looked_at(recording: Recording) -> tuple[int, ...]:
     if not recording.moves or recording.n_frames < 2:
-        return [0][: recording.n_frames]
+        return (0,)[: recording.n_frames]
     meshes = [actor.figure.mesh for actor in recording.scene.actors]
     n_points = sum(mesh.n_vertices for mesh in meshes if mesh is not None)
     most = min(max(_MOST_POINTS // max(n_points, 1), 4), _MOST_FRAMES)
     return frames_looked_at(recording.n_frames, most)
 
 
-def frames_looked_at(n_frames: int, most: int) -> list[int]:
+@functools.cache
+def frames_looked_at(n_frames: int, most: int) -> tuple[int, ...]:
     """Return representative frames, evenly spaced from the first to the last.
 
     >>> frames_looked_at(7, 3)
-    [0, 3, 6]
+    (0, 3, 6)
     """
     places = np.linspace(0, n_frames - 1, min(most, n_frames))
-    return sorted(set(np.rint(places).astype(int).tolist()))
+    return tuple(sorted(set(np.rint(places).astype(int).tolist())))
 
 
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:

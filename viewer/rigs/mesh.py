@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -150,7 +151,7 @@ def bounding_box(points: Floats) -> Floats:
 
 def box_size(box: Floats) -> float:
     """Return the length of a box's diagonal, the "size" to which tolerances refer."""
-    return float(np.linalg.norm(box[1] - box[0]))
+    return math.dist(*box.tolist())
 
 
 def triangle_areas(positions: Floats, triangles: Ints) -> Floats:

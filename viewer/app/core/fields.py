@@ -23,7 +23,8 @@ _COLUMN, _WIDEST = 0.4, 8.5
 _TRACK, _KNOB = 0.14, (0.4, 0.3)
 """Height of the track, width and height of the knob, in font sizes."""
 _CLEAR = (0.0, 0.0, 0.0, 0.0)
-_CLAMP = imgui.SliderFlags_.always_clamp
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
+_LOGARITHMIC = int(imgui.SliderFlags_.logarithmic)
 
 
 def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: float = 0.0) -> str:
@@ -71,7 +72,7 @@ def slider_float(
     """Draw a slider with a hidden label; return whether it was moved, and its value."""
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, high), text, flags)
-    with _Track(bool(flags and flags & imgui.SliderFlags_.logarithmic)) as track:
+    with _Track(bool(flags & _LOGARITHMIC)) as track:
         changed, moved = imgui.slider_float(label, value, low, high, text, flags)
         track.draw(moved, low, high)
     return changed, moved
@@ -160,12 +161,10 @@ class _Track:
         self._is_logarithmic = is_logarithmic
 
     def __enter__(self) -> _Track:
-        style = imgui.get_style()
-        colors = imgui.Col_.slider_grab, imgui.Col_.slider_grab_active
-        # These are copies, because the style's colours are about to change.
-        self._quiet, self._strong = (list(style.color_(color)) for color in colors)
-        for color in colors:
-            imgui.push_style_color(color, _CLEAR)
+        quiet, strong = imgui.Col_.slider_grab, imgui.Col_.slider_grab_active
+        self._quiet, self._strong = imgui.get_color_u32(quiet), imgui.get_color_u32(strong)
+        imgui.push_style_color(quiet, _CLEAR)
+        imgui.push_style_color(strong, _CLEAR)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -179,12 +178,11 @@ class _Track:
         letter, grab = imgui.get_font_size(), imgui.get_style().grab_min_size
         # ImGui moves the centre of its handle between these positions.
         left, right = start.x + 2.0 + 0.5 * grab, end.x - 2.0 - 0.5 * grab
-        at, origin = (
-            left + _fraction(number, low, high, self._is_logarithmic) * (right - left)
-            for number in (value, min(max(0.0, low), high))
-        )
+        zero, is_log = min(max(0.0, low), high), self._is_logarithmic
+        at = left + _fraction(value, low, high, is_log) * (right - left)
+        origin = left + _fraction(zero, low, high, is_log) * (right - left)
         is_active = imgui.is_item_active() or imgui.is_item_hovered()
-        color = imgui.get_color_u32(self._strong if is_active else self._quiet)
+        color = self._strong if is_active else self._quiet
         ink = imgui.get_window_draw_list()
         top = end.y - max(_TRACK * letter, 2.0)
         ink.add_rect_filled((min(at, origin), top), (max(at, origin), end.y), color)

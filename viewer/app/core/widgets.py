@@ -26,6 +26,18 @@ _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 # Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
 _HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
+_LOGARITHMIC = int(imgui.SliderFlags_.logarithmic)
+_OVERLAY = int(
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.always_auto_resize
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_inputs
+    | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.no_nav
+)
+_ENABLED = contextlib.nullcontext()
 Rect = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in window coordinates."""
 
@@ -54,25 +66,31 @@ def note_item(state: AppState, label: str) -> None:
         explain("", reasons[-1])
 
 
-@contextlib.contextmanager
-def disabled(state: AppState, why: str) -> Iterator[None]:
+def disabled(state: AppState, why: str) -> contextlib.AbstractContextManager[None]:
     """Disable the widgets of a block if there is a reason, which their tooltips show."""
+    return _disabled_for(state, why) if why else _ENABLED
+
+
+@contextlib.contextmanager
+def _disabled_for(state: AppState, why: str) -> Iterator[None]:
     reasons = state.of(_Disabled).reasons
-    reasons += [why] if why else []
-    imgui.begin_disabled(bool(why))
+    reasons.append(why)
+    imgui.begin_disabled()
     try:
         yield
     finally:
         imgui.end_disabled()
-        del reasons[len(reasons) - bool(why) :]
+        reasons.pop()
 
 
 def explain(text: str, why: str = "") -> None:
     """Give the last widget a tooltip: its effect, and the reason why it is disabled, if it is."""
+    if not (text or why):
+        return
     if not why and imgui.get_current_context().last_item_data.item_flags & _DISABLED:
         # The reason of the enclosing block is shown already.
         return
-    if (text or why) and imgui.is_item_hovered(_HOVERED):
+    if imgui.is_item_hovered(_HOVERED):
         show_tooltip("\n".join(filter(None, (text, why))))
 
 
@@ -140,11 +158,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
     """Begin a small window over the view that takes no input; ``imgui.end`` must follow."""
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
     imgui.set_next_window_bg_alpha(0.86)
-    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking
-    flags |= imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
-    flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
-    flags |= imgui.WindowFlags_.no_nav
-    return imgui.begin(name, None, flags)[0]
+    return imgui.begin(name, None, _OVERLAY)[0]
 
 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
@@ -300,12 +314,9 @@ def draw_setting(
         elif "choices" in facts:
             new = choice(state, label, value, facts["choices"])
         elif isinstance(value, int):
-            clamp = imgui.SliderFlags_.always_clamp
-            new = count_slider(state, label, value, facts["limits"], flags=clamp)
+            new = count_slider(state, label, value, facts["limits"], flags=_CLAMP)
         else:
-            flags = imgui.SliderFlags_.always_clamp
-            if facts.get("logarithmic"):
-                flags |= imgui.SliderFlags_.logarithmic
+            flags = _CLAMP | _LOGARITHMIC if facts.get("logarithmic") else _CLAMP
             low, high = facts["limits"]
             new = slider(state, label, value, low, high, facts.get("unit", "%.2f"), flags)
         explain(text, why)

@@ -39,7 +39,7 @@ from viewer.rigs.scene import Actor, Motion
 from viewer.rigs.srgb import encode_color
 
 _WIDEST_LIST = 16.0  # maximum width of the list of animations, in font sizes
-_CLAMP = imgui.SliderFlags_.always_clamp
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
 _gaps: Memo[Motion, bool] = Memo()
 _LIMITS = (0.01, 1000.0)
 """Lowest and highest rate that can be set, frames per second."""

@@ -20,7 +20,7 @@ from viewer.rigs.memo import Memo
 from viewer.rigs.pose import Pose, joint_rotations, set_joint_rotations
 
 _REACH = 3.0  # range of a slider; larger values can be typed
-_CLAMP = imgui.SliderFlags_.always_clamp
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
 _coefficients: Memo[Hand, Floats] = Memo()
 
 

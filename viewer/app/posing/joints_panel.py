@@ -69,8 +69,8 @@ _LABEL_WIDTH = 1.6  # width of a label, in font sizes
 _INDENT = 0.6  # indentation per level, in font sizes
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
-_MAY_TYPE_BEYOND = imgui.SliderFlags_.none
-_STAYS_WITHIN = imgui.SliderFlags_.always_clamp
+_MAY_TYPE_BEYOND = int(imgui.SliderFlags_.none)
+_STAYS_WITHIN = int(imgui.SliderFlags_.always_clamp)
 _Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 _OWN_NUMBERS = -2
 """Value used instead of a DOF for the row with the raw pose values of the body model."""
@@ -87,6 +87,12 @@ _ON_POSES = (
 )
 """Menu of actions on the whole pose."""
 _SEEN, _DOUBTFUL = (0.30, 0.55, 0.38, 1.0), (0.62, 0.42, 0.22, 1.0)
+_NODE = int(
+    imgui.TreeNodeFlags_.no_tree_push_on_open
+    | imgui.TreeNodeFlags_.open_on_arrow
+    | imgui.TreeNodeFlags_.span_avail_width
+)
+_SELECTED = int(imgui.TreeNodeFlags_.selected)
 _NAME_WIDTH = 0.55  # width of the names, as a fraction of the panel's width
 
 
@@ -181,10 +187,7 @@ def _draw_head(state: AppState) -> None:
 
 
 def _draw_joint(state: AppState, joint: int, label: str) -> None:
-    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
-    flags |= imgui.TreeNodeFlags_.span_avail_width
-    if joint == state.selected_joint:
-        flags |= imgui.TreeNodeFlags_.selected
+    flags = _NODE | _SELECTED if joint == state.selected_joint else _NODE
     imgui.set_next_item_open(joint in joint_tree(state).opened or bool(joint_tree(state).filter))
     imgui.tree_node_ex(f"{label}##joint{joint}", flags)
     note_item(state, f"joint {label}")

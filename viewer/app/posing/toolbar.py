@@ -35,6 +35,15 @@ from viewer.rigs.skeleton import joint_label
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
+_FLAGS = int(
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.always_auto_resize
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+)
 _WIDTH = 14.5  # fixed width of each row, in font sizes: buttons must not move when rows appear
 
 
@@ -50,11 +59,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
         top = legend[3] + _GAP
     imgui.set_next_window_pos((x + width - _GAP, top), imgui.Cond_.always, (1.0, 0.0))
     imgui.set_next_window_bg_alpha(0.86)
-    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
-    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    flags |= imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
-    flags |= imgui.WindowFlags_.no_bring_to_front_on_focus
-    if imgui.begin("##tools", None, flags)[0]:
+    if imgui.begin("##tools", None, _FLAGS)[0]:
         _draw_tools(state)
         if state.of(Posing).is_on:
             _draw_settings(state)

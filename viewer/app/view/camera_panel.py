@@ -27,8 +27,8 @@ from viewer.rigs.inspection.front import WantedFront, front_axes
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.scene import actor_points
 
-_CLAMP = imgui.SliderFlags_.always_clamp
-_LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
+_LOG = int(imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format)
 _AROUND = 0.12  # extent shown around a joint, relative to the actor's size
 
 

@@ -62,7 +62,7 @@ _BACKGROUNDS = {
     "transparent": "Transparent",
     "#": "Colour",
 }
-_CLAMP = imgui.SliderFlags_.always_clamp
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
 JOINT_TOGGLES = {
     "xray": ("X-ray", "B"),
     "joint_names": ("Joint names", "J"),

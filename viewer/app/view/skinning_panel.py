@@ -18,7 +18,7 @@ from viewer.app.files.files import offer_files
 from viewer.rigs.scalars import strongest
 from viewer.rigs.skinning import METHODS
 
-_CLAMP = imgui.SliderFlags_.always_clamp
+_CLAMP = int(imgui.SliderFlags_.always_clamp)
 _ENGINE = 4  # influences per vertex in most game engines
 
 
