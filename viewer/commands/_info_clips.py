@@ -37,7 +37,7 @@ def _describe_keys(clip: Clip) -> JsonObject:
     modes = Counter(mode for channel in clip.channels for mode in channel.extrapolation)
     return {
         "channels": len(clip.channels),
-        "keys": sum(len(channel.times) for channel in clip.channels),
+        "keys": clip.n_keys,
         "key_times": [min(times), max(times)] if times else [],
         "extrapolation": dict(sorted(modes.items())),
     }
@@ -52,7 +52,7 @@ def _describe_transforms(clip: TransformClip) -> JsonObject:
         "channels": len(clip.channels),
         "paths": _counts(channel.path for channel in clip.channels),
         "interpolation": _counts(channel.interpolation for channel in clip.channels),
-        "keys": sum(len(channel.times) for channel in clip.channels),
+        "keys": clip.n_keys,
         "key_times": [min(ends), max(ends)] if ends else [],
     }
 

@@ -174,7 +174,7 @@ def _summary(path: Path, clip: Clip, how: Phrase | str) -> Diagnostic:
         "X001.anim: {channels} with {keys}, {start:zg} to {end:zg} s{how}",
         path,
         channels=counted(len(clip.channels), "channel"),
-        keys=counted(sum(len(channel.times) for channel in clip.channels), "key"),
+        keys=counted(clip.n_keys, "key"),
         start=float(clip.start),
         end=float(clip.end),
         how=optional(", {}", how),

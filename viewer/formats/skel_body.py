@@ -34,6 +34,7 @@ from viewer.rigs.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing,
 from viewer.rigs.bodies.pose_features import MappedFeature
 from viewer.rigs.bodies.smpl_family import ShapeSpace, gender_of
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import are_rotations
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.hierarchy import parent_faults
 from viewer.rigs.mesh import Mesh, vertex_normals
@@ -117,8 +118,7 @@ def _parents(archive: Archive) -> Ints:
 
 
 def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
-    products = np.swapaxes(matrices, 1, 2) @ matrices
-    wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
+    wrong = ~are_rotations(matrices, _ROUNDED)
     if wrong.any():
         raise archive.fault(
             "F002.skel-rotation: {item}: joint {joint}: expected a rotation matrix",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.loading.scaling import scale_to_unit
 from viewer.phrases import Remedy
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats
 from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.captures.cameras import CameraView
 from viewer.rigs.captures.capture import Capture, CapturePart
@@ -25,13 +26,13 @@ from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, parameter_clip
 from viewer.rigs.motion.sampled_clip import SampledClip, joined, with_rate
-from viewer.rigs.motion.timing import Timing
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_map import JointMap
 from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.springs.simulation import springs_for
 
+_Clip = TypeVar("_Clip", bound=SampledClip | PointClip)
 _COLORS = (
     (0.85, 0.42, 0.28),
     (0.24, 0.52, 0.80),
@@ -294,7 +295,7 @@ class Builder:
                     known=len(known.names),
                 )
             ]
-        self._replace_clip(actor, _joined_points(actor.clip, clip))
+        self._replace_clip(actor, _extended(actor.clip, clip))
         return []
 
     def _actor(self, figure: Figure, clip: SampledClip | PointClip, person: int) -> Actor:
@@ -380,18 +381,9 @@ def _grown(first: Drive, second: Drive) -> Drive:
     return replace(first, motion=replace(motion, clip=clip))
 
 
-def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
+def _extended(first: _Clip, second: _Clip) -> _Clip:
     """Return one clip with the rows of two clips on the same timeline."""
-    return joined([first, second], _joined_timing(first.timing, second.timing, first.n_rows))
-
-
-def _joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
-    """Return the timing of concatenated rows: those of ``second`` are offset by ``shift``."""
-    rows: Ints = np.where(second.rows >= 0, second.rows + shift, first.rows).astype(np.int32)
-    return replace(first, rows=rows)
-
-
-def _joined_points(first: PointClip, second: PointClip) -> PointClip:
-    """Return one clip with the concatenated rows of two clips on the same timeline."""
-    timing = _joined_timing(first.timing, second.timing, len(first.points))
-    return PointClip(first.name, timing, np.concatenate([first.points, second.points]))
+    own, new = first.timing, second.timing
+    # The rows of the second clip follow those of the first.
+    rows = np.where(new.rows >= 0, new.rows + first.n_rows, own.rows).astype(np.int32)
+    return joined([first, second], replace(own, rows=rows))

@@ -18,7 +18,7 @@ from viewer.phrases import all_of
 from viewer.rigs.arrays import Bools, Bytes, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rigs.geometry.rotation import matrix_to_quaternion
+from viewer.rigs.geometry.rotation import are_rotations, matrix_to_quaternion
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.material import Material, Texture
@@ -341,8 +341,7 @@ def _quaternions(rotations: ArrayLike, n_joints: int, representation: Rotations 
     if not len(values):
         raise RigError("rotations: expected at least one frame, found none")
     if kind == "matrix":
-        apart = np.abs(values @ np.swapaxes(values, -1, -2) - np.eye(3)).max(axis=(-1, -2))
-        is_rotation = (apart < _SKEWED) & (np.linalg.det(values) > 0.0)
+        is_rotation = are_rotations(values, _SKEWED)
         _check_rotations(is_rotation, "a rotation matrix, found one that scales, shears or mirrors")
         return matrix_to_quaternion(values)
     if kind == "rotation_vector":

@@ -35,7 +35,7 @@ from viewer.rigs.motion.clip_edit import (
 )
 from viewer.rigs.motion.transform_clip import Interpolation, TransformChannel, TransformClip
 from viewer.rigs.number_text import number_text
-from viewer.rigs.scene import Actor, Motion
+from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.transform_keys.edit import (
     add_transform_key,
@@ -411,17 +411,9 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     if keyed is None or actor.own_pose is None:
         return
     time = state.clock.time - actor.offset
-    before = _n_keys(actor.clip)
-    actor.clip = keyed.posed(actor, time, only_changed)
-    added = _n_keys(actor.clip) - before
+    actor.clip = new = keyed.posed(actor, time, only_changed)
+    added = new.n_keys - keyed.clip.n_keys
     state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {added} new keys")
-
-
-def _n_keys(clip: Motion | None) -> int:
-    """Return the number of keys of a clip."""
-    if clip is None or clip.timing is not None:
-        return 0
-    return sum(len(channel.times) for channel in clip.channels)
 
 
 def ask_for_clip(state: AppState) -> None:

@@ -37,7 +37,7 @@ from viewer.media.image import decode_picture, picture_dimensions
 from viewer.phrases import axes, listed, printable, quoted
 from viewer.rigs.arrays import Floats
 from viewer.rigs.captures.cameras import CameraImage, CameraView
-from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.rotation import are_rotations, rotation_vector_to_matrix
 
 _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
 _KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
@@ -175,8 +175,7 @@ def _rotation(file: _Storage, name: str) -> Floats:
     if f"Rot_{name}" not in file.values:
         return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
-    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    if off > _NEAR or np.linalg.det(rotation) < 0.0:
+    if not are_rotations(rotation, _NEAR):
         raise file.fault("F002.camera-rotation: {item}: not a rotation matrix", item=f"Rot_{name}")
     return rotation
 

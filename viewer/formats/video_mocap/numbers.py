@@ -86,6 +86,14 @@ def places(archive: Archive, key: str, count: int) -> Floats:
     return within_reach(archive, key, found)
 
 
+def pose_of(archive: Archive, rotations: str, translations: str) -> tuple[Floats, Floats] | None:
+    """Return rotations (N, 3, 3) and translations (N, 3) of a camera; None without both keys."""
+    if not has(archive, rotations, translations):
+        return None
+    count = (archive.array(translations).shape or (0,))[0]
+    return rotations_of(archive, rotations, (count, 3, 3)), places(archive, translations, count)
+
+
 def frames_of(archive: Archive, key: str, count: int) -> Frames:
     """Return frame numbers, integers in any order: (N,); of a table, those in its first column."""
     shape = (count, None) if len(archive.array(key).shape) == 2 else (count,)

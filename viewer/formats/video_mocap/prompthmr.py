@@ -28,7 +28,7 @@ from viewer.formats.video_mocap.numbers import (
     numbers,
     person_number,
     places,
-    rotations_of,
+    pose_of,
     rows,
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse
@@ -98,8 +98,7 @@ def _cameras(archive: Archive) -> dict[str, Cameras]:
 def _pose(world: Archive) -> tuple[Floats, Floats] | None:
     """Return R and T from the world to the camera."""
     for turned, placed, is_inverse in _WAYS:
-        if has(world, turned, placed):
-            count = (world.array(placed).shape or (0,))[0]
-            pose = rotations_of(world, turned, (count, 3, 3)), places(world, placed, count)
+        pose = pose_of(world, turned, placed)
+        if pose is not None:
             return inverse(*pose) if is_inverse else pose
     return None

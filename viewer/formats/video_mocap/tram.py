@@ -28,7 +28,7 @@ from viewer.formats.video_mocap.numbers import (
     matrices,
     numbers,
     places,
-    rotations_of,
+    pose_of,
     rows,
     six,
 )
@@ -136,9 +136,9 @@ def _track(archive: Archive) -> Track:
 def _pose(camera: Archive | None) -> tuple[Floats, Floats, SignedUp] | None:
     """Return rotations and translations from the camera to the world, and the world's up axis."""
     for turned, placed, up in _POSES:
-        if camera is not None and has(camera, turned, placed):
-            count = (camera.array(placed).shape or (0,))[0]
-            return rotations_of(camera, turned, (count, 3, 3)), places(camera, placed, count), up
+        pose = None if camera is None else pose_of(camera, turned, placed)
+        if pose is not None:
+            return *pose, up
     return None
 
 

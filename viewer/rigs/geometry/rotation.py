@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.geometry.quaternion import quaternion_to_rotation_vector
 
 _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
@@ -126,6 +126,13 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
     rotations = (left * signs[..., None, :]) @ right
     return rotations, np.swapaxes(rotations, -1, -2) @ matrices
+
+
+def are_rotations(matrices: Floats, tolerance: float) -> Bools:
+    """Return which matrices (..., 3, 3) rotate: R R^T differs from I by less, and det R > 0."""
+    apart = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+    found: Bools = (apart < tolerance) & (np.linalg.det(matrices) > 0.0)
+    return found
 
 
 def quarter_turn(up: str) -> Floats:

@@ -111,6 +111,11 @@ class Clip:
     def __post_init__(self) -> None:
         check_range(self, self.name, self.start, self.end)
 
+    @property
+    def n_keys(self) -> int:
+        """Number of keys of all channels."""
+        return sum(len(channel.times) for channel in self.channels)
+
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
     ) -> Samples:

@@ -119,6 +119,11 @@ class TransformClip:
         check_range(self, self.name, self.start, self.end)
 
     @property
+    def n_keys(self) -> int:
+        """Number of keys of all channels."""
+        return sum(len(channel.times) for channel in self.channels)
+
+    @property
     def sets_shape(self) -> bool:
         """Whether it sets weights of blend shapes."""
         return any(channel.path == "weights" for channel in self.channels)
