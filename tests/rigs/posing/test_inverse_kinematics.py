@@ -10,7 +10,14 @@ from viewer.errors import RigError
 from viewer.rigs.constraints.constraint import Constraint
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import dof_rotations, rest_pose
-from viewer.rigs.posing.inverse_kinematics import Reach, Reaching, chain_above, position_of
+from viewer.rigs.posing.inverse_kinematics import (
+    ChainPosition,
+    FigurePosition,
+    Reach,
+    Reaching,
+    chain_above,
+    position_of,
+)
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 
 NO_LIMIT = (-np.inf, np.inf)
@@ -171,6 +178,52 @@ def test_jacobian_matches_finite_differences():
             moved.dofs[row] += step
             ends.append(world_matrices(skeleton, moved)[3, :3, 3])
         assert_allclose(column, (ends[0] - ends[1]) / 2e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", [ChainPosition, FigurePosition])
+def test_curvature_matches_finite_differences(kind):
+    rng = np.random.default_rng(4)
+    joints = rng.normal(size=(4, 3))
+    skeleton = ball_skeleton(tuple("abcd"), np.array([-1, 0, 1, 2]), joints)
+    skeleton = replace(skeleton, rest_scales=rng.uniform(0.5, 2.0, (4, 3)))
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = rng.normal(size=12)
+    rows, along, step = np.array([1, 4, 5, 8], dtype=np.int32), rng.normal(size=3), 1e-3
+
+    def height(*changes: tuple[int, float]) -> float:
+        moved = pose.copy()
+        for row, change in changes:
+            moved.dofs[row] += change
+        return world_matrices(skeleton, moved)[3, :3, 3] @ along
+
+    found = kind(skeleton, pose, 3, rows).curvature(pose.dofs[rows], along)
+    for i, first in enumerate(rows.tolist()):
+        for j, second in enumerate(rows.tolist()):
+            both = [
+                sign * other * height((first, sign * step), (second, other * step))
+                for sign in (1, -1)
+                for other in (1, -1)
+            ]
+            # Central differences of second order, with an error of about the square of the step.
+            assert_allclose(found[i, j], sum(both) / (4.0 * step**2), atol=1e-4)
+
+
+def test_each_call_of_a_drag_is_short_wherever_it_leads(monkeypatch):
+    # Searches for another pose, of which limits need many here, are spread over calls.
+    calls, at = [], ChainPosition.at
+    monkeypatch.setattr(ChainPosition, "at", lambda self, x: (calls.append(1), at(self, x))[1])
+    joints = np.cumsum([[0.0, 1.0, 0], *[[0.15, 0.0, 0.02]] * 5], axis=0)
+    skeleton = ball_skeleton(tuple("abcdef"), np.arange(-1, 5), joints)
+    limits = np.tile(np.radians([-40.0, 40.0]), (18, 1))
+    skeleton = replace(skeleton, dof_limits=limits)
+    reaching = Reaching(skeleton, rest_pose(skeleton), 5, 5)
+    counts = []
+    for target in walk(1, joints[0], 0.9, joints[5], 150):
+        calls.clear()
+        reaching.follow(target)
+        counts.append(len(calls))
+    # Up to ten steps towards the target and four in a search, of which some are tried again.
+    assert max(counts) <= 26
 
 
 def test_joint_that_copies_another_bends_with_it():

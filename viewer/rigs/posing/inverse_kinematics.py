@@ -49,7 +49,9 @@ _MOST_NEEDED = 3.0  # what a target that is followed may need, relative to _RATE
 _RETURN = 0.2  # rotation towards the pose at the start that leaves the joint in place, of _RATE
 _GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
 _MARGIN = 1.25  # of what a step needs, which is known by its linearisation
-_DRAG_ROUNDS = 10  # maximum steps per call, which bounds the time of a frame
+# Maximum steps per call towards the target, and in a search for another pose: they bound the time
+# of a frame.
+_DRAG_ROUNDS, _SEARCH_ROUNDS = 10, 4
 _SLOW = 1e-3  # relative decrease of the error below which a drag has settled
 # Distance to the target from which a joint may be held by limits or a straight chain, and movement
 # of the target after which other poses are tried again, of the chain's length.
@@ -100,6 +102,10 @@ class Position(Protocol):
         """Return the position (3,) at DOFs (N,), and its derivatives (3, N) per radian."""
         ...
 
+    def curvature(self, values: Floats, along: Floats) -> Floats:
+        """Return the second derivatives (N, N) of the position along a vector (3,)."""
+        ...
+
 
 class ChainPosition:
     """Position of a joint below a chain of joints that rotate about their axes."""
@@ -148,6 +154,28 @@ class ChainPosition:
 
     def at(self, values: Floats) -> tuple[Floats, Floats]:
         """Return the position (3,) at DOFs (N,), and its derivatives (3, N) per radian."""
+        end, _, columns = self._links(values)
+        jacobian = np.empty((3, len(columns)))
+        jacobian[:, self._order] = columns.T
+        return end, jacobian
+
+    def curvature(self, values: Floats, along: Floats) -> Floats:
+        """Return the second derivatives (N, N) of the position along a vector (3,)."""
+        # With dp/dq_j = P_i w for every rotation j at or inside of i, and dP_i/dq_i = P_i K_i,
+        # d^2p/dq_i dq_j = P_i K_i w = P_i K_i P_i^-1 dp/dq_j.
+        _, steps, columns = self._links(values)
+        outer = steps[:, :3, :3]
+        turned = outer @ self._cross[:, :3, :3] @ np.linalg.pinv(outer)
+        upper = np.triu(np.einsum("iab,a,jb->ij", turned, along, columns))
+        found = np.empty_like(upper)
+        found[np.ix_(self._order, self._order)] = upper + np.triu(upper, 1).T
+        return found
+
+    def _links(self, values: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the position (3,), the maps P_i, (N, 4, 4), and the derivatives dp/dq_i, (N, 3).
+
+        The last two are in the order of the chain, from the outside.
+        """
         angles = values[self._order, None, None]
         turns = _IDENTITY + np.sin(angles) * self._cross + (1.0 - np.cos(angles)) * self._square
         # From the inside, B_i R_i ... B_n, and from the outside, P_i. The loops run in every step
@@ -160,10 +188,9 @@ class ChainPosition:
         for step in turns[:-1] @ self._maps[1:]:
             steps.append(steps[-1].dot(step))
         vectors = turns @ np.array(ends[-2::-1])[:, :, None]
-        columns = np.array(steps) @ (self._cross @ vectors)
-        jacobian = np.empty((3, len(turns)))
-        jacobian[:, self._order] = columns[:, :3, 0].T
-        return ends[-1][:3], jacobian
+        every = np.array(steps)
+        columns = every @ (self._cross @ vectors)
+        return ends[-1][:3], every, columns[:, :3, 0]
 
 
 class FigurePosition:
@@ -177,6 +204,12 @@ class FigurePosition:
         moved = [self._place(values + each) for each in _APART * np.eye(len(values))]
         back = [self._place(values - each) for each in _APART * np.eye(len(values))]
         return self._place(values), (np.array(moved) - back).T / (2.0 * _APART)
+
+    def curvature(self, values: Floats, along: Floats) -> Floats:
+        """Return the second derivatives (N, N) along a vector (3,), by differences."""
+        here = self.at(values)[1]
+        change = [self.at(values + each)[1] - here for each in _APART * np.eye(len(values))]
+        return np.einsum("a,iaj->ij", along, change) / _APART
 
     def _place(self, values: Floats) -> Floats:
         self._pose.dofs[self._rows] = values
@@ -222,6 +255,7 @@ class Reaching:
         self._soft = float(np.clip(room, 0.0, _SOFT * self._size))
         self._target = self._wanted = self._first.place
         self._damping = _FIRST_DAMPING
+        self._other: _State | None = None  # from the start, searched for a nearer pose
         self._since_held = np.inf  # movement of the target since, of the chain's length
 
     def follow(self, target: Floats) -> Reach:
@@ -239,10 +273,17 @@ class Reaching:
         goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
         self._since_held += moved
         is_held = is_settled and self._left(goal) > _MISSED * self._size
-        if is_held and self._since_held >= _RETRY:
+        if is_held and self._other is not None:
+            goal, is_settled = self._freed(goal, self._other)
+        elif is_held and self._since_held >= _RETRY:
             self._since_held = 0.0
-            goal, is_settled = self._freed(goal)
+            bent = self._bent(goal)
+            self._other = self._first if bent is None else None
+            goal, is_settled = (goal, is_settled) if bent is None else (bent, False)
+        elif is_settled:  # at the target
+            self._other = None
         self._goal = goal
+        is_settled &= self._other is None
         return self._shown(most, is_settled)
 
     def _shown(self, most: float, is_settled: bool) -> Reach:
@@ -354,18 +395,14 @@ class Reaching:
         nearer = state.at(state.values + self._step(state, np.zeros(3), self._damping, wish))
         return nearer if self._left(nearer) <= self._left(state) else state
 
-    def _freed(self, state: _State) -> tuple[_State, bool]:
-        """Return a nearer state than one that is held, and whether the search for it ended."""
-        # It is bent, or found from the start of the drag.
-        bent = self._bent(state)
-        if bent is not None:
-            return self._nearest(bent, _DRAG_ROUNDS, _SLOW)
+    def _freed(self, state: _State, other: _State) -> tuple[_State, bool]:
+        """Return another state if it is nearer than one that is held, and whether it is settled."""
+        # The search goes on in the next call, so that none takes long.
         least = self._left(state) - _RETRY * self._size
-        if least > 0.0:
-            other, is_settled = self._nearest(self._first, _DRAG_ROUNDS, _SLOW)
-            if self._left(other) < least:
-                return other, is_settled
-        return state, True
+        other, is_settled = self._nearest(other, _SEARCH_ROUNDS, _SLOW)
+        is_nearer = self._left(other) < least
+        self._other = None if is_nearer or is_settled or least <= 0.0 else other
+        return (other, is_settled) if is_nearer else (state, True)
 
     def _bent(self, state: _State) -> _State | None:
         """Return a state nearer than one that no small rotation improves, such as a straight one.
@@ -384,10 +421,8 @@ class Reaching:
         if not len(rows):
             return None
         part, distance = state.jacobian[:, rows], self._left(state)
-        ends = _APART * np.eye(len(values))[rows]
-        change = [state.at(values + end).jacobian - state.jacobian for end in ends]
-        second = np.array(change)[:, :, rows] / _APART
-        curvature = part.T @ part - np.einsum("a,iaj->ij", error, second)
+        second = state.position.curvature(values, error)[np.ix_(rows, rows)]
+        curvature = part.T @ part - second
         sizes, vectors = np.linalg.eigh(curvature)
         for vector in vectors.T[sizes < -_SADDLE * self._size**2]:
             for bend in (_BEND, -_BEND):
@@ -407,9 +442,9 @@ class _State:
     """Rotation DOFs (N,) of a chain, with the joint's position (3,) and derivatives (3, N)."""
 
     def __init__(self, position: Position, values: Floats) -> None:
-        self._position, self.values = position, values
+        self.position, self.values = position, values
         self.place, self.jacobian = position.at(values)
 
     def at(self, values: Floats) -> _State:
         """Return the state at other DOFs."""
-        return _State(self._position, values)
+        return _State(self.position, values)
