@@ -94,11 +94,9 @@ def _draw(opening: Opening[Found], shell: Shell) -> bool:
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
     is_pressed = False
     if imgui.begin("##opening", None, flags)[0]:
-        done, total, unit = opening.progress
-        text = f"{done:,} of {total:,} {unit}" if total else f"{opening.seconds:.0f} s"
         bar = min(_BAR_WIDTH * imgui.get_font_size(), 0.8 * imgui.get_main_viewport().size.x)
         imgui.text_unformatted(f"Opening {printable(opening.title, 60)}")
-        imgui.progress_bar(done / total if total else -opening.seconds, (bar, 0.0), text)
+        imgui.progress_bar(opening.fraction, (bar, 0.0), opening.text)
         is_pressed = imgui.button("Cancel opening") or imgui.is_key_pressed(imgui.Key.escape)
     imgui.end()
     imgui.render()

@@ -106,13 +106,7 @@ def _progress(state: AppState) -> _Progress | None:
         return None
     if job.is_cancelled:
         return _Progress(f"Cancelling: {job.title}", -imgui.get_time(), "", "")
-    done, total, unit = job.progress
-    is_aside = job is stream
-    if not total:
-        return _Progress(job.title, -job.seconds, f"{job.seconds:.0f} s", label, is_aside)
-    # Work without countable steps reports percentages.
-    text = f"{done} %" if (total, unit) == (100, "") else f"{done:,} of {total:,} {unit}".rstrip()
-    return _Progress(job.title, done / total, text, label, is_aside)
+    return _Progress(job.title, job.fraction, job.text, label, job is stream)
 
 
 def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> Rect | None:

@@ -11,7 +11,7 @@ from viewer.errors import ViewerError
 from viewer.models import BUNDLED, data_folder, found_models, load_model_folder, save_model_folder
 from viewer.models.download import ADDABLE, CATALOG, add_model, pip_command
 from viewer.near_names import name_hint
-from viewer.phrases import printable
+from viewer.phrases import file_size, printable
 
 _STYLES = {"found": "green", "missing": "yellow", "bundled": "green"}
 
@@ -79,6 +79,5 @@ def _add(name: str, is_dry: bool) -> int:
     model = CATALOG[name]
     print(f"downloading {model.title} ({model.licence}) with pip …", file=sys.stderr)
     path = add_model(name)
-    size = path.stat().st_size / 1e6
-    print(f"{path} ({size:.1f} MB): open it with viewer {name}")
+    print(f"{path} ({file_size(path.stat().st_size)}): open it with viewer {name}")
     return 0

@@ -14,6 +14,8 @@ The skeleton mesh (``skel_template_v``) is not read.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from viewer.diagnostics import wording
@@ -38,7 +40,7 @@ from viewer.rigs.geometry.rotation import are_rotations
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.hierarchy import parent_faults
 from viewer.rigs.mesh import Mesh, vertex_normals
-from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skin import Skin, skin_from_entries
 
 _KEYS = (
@@ -91,13 +93,8 @@ def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
     _check_rotations(archive, "apose_rel_transfo", frames[:, :3, :3])
     _check_rotations(archive, "per_joint_rot", learned)
     owners, kinds = dof_table()
-    above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
-    return Skeleton(
-        names=JOINTS,
-        parents=parents,
-        rest_translations=joints - above,
-        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (len(JOINTS), 1)),
-        rest_scales=np.ones((len(JOINTS), 3)),
+    return replace(
+        ball_skeleton(JOINTS, parents, joints),
         dof_joints=owners,
         dof_kinds=kinds,
         rest_dofs=np.zeros(len(owners)),

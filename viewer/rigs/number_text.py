@@ -1,4 +1,4 @@
-"""Number and angle formatting for display."""
+"""Number and angle formatting for display, and round steps of scales."""
 
 from __future__ import annotations
 
@@ -19,6 +19,17 @@ def short_number(value: float) -> str:
     """Format a number with three significant digits, see ``viewer.phrases.rounded``."""
     text = rounded(value)
     return text if _NOT_ZERO.intersection(text) else "0"
+
+
+def round_step(least: float) -> float:
+    """Return the smallest of 1, 2 and 5 times a power of ten that is not below a number.
+
+    >>> [round_step(x) for x in (0.2, 0.21, 1.5, 3.0, 11.0, 60.0)]
+    [0.2, 0.5, 2.0, 5.0, 20.0, 100.0]
+    """
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= 0.999 * least)
+    return float(f"{step:.6g}")  # powers below 1 are rounded
 
 
 def angle_text(radians: float, in_degrees: bool, sign: str = "") -> str:

@@ -44,6 +44,21 @@ class Job:
         """Seconds since it began."""
         return time.monotonic() - self._started
 
+    @property
+    def fraction(self) -> float:
+        """Fraction of completed steps, for a progress bar; negative if their total is unknown."""
+        done, total, _ = self.progress
+        return done / total if total else -self.seconds
+
+    @property
+    def text(self) -> str:
+        """Progress as text; work without countable steps reports percentages."""
+        done, total, unit = self.progress
+        if not total:
+            return f"{self.seconds:.0f} s"
+        is_percentage = (total, unit) == (100, "")
+        return f"{done} %" if is_percentage else f"{done:,} of {total:,} {unit}".rstrip()
+
     def step(self) -> None:
         """Perform the part of the job that runs in the frame loop; called once a frame."""
 

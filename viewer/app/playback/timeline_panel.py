@@ -34,7 +34,7 @@ from viewer.rigs.memo import Memo
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.sampled_clip import with_rate
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rigs.number_text import number_text
+from viewer.rigs.number_text import number_text, round_step
 from viewer.rigs.scene import Actor, Motion
 from viewer.rigs.srgb import encode_color
 
@@ -402,7 +402,7 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float]) -> None:
     # Room for two numbers: the last number may be to the left of its tick.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
     room = max(_TICK_GAP * imgui.get_font_size(), room)
-    step = _nice_step(room / scale * clock.frame_rate)
+    step = int(round_step(max(room / scale * clock.frame_rate, 1.0)))
     for number in range(math.ceil(first / step) * step, last + 1, step):
         x = left + (clock.frame_time(number - clock.first_frame) - low) * scale
         draw_list.add_line((x, top), (x, top + total), line)
@@ -430,16 +430,6 @@ def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
     draw_list.add_line((x, top), (x, top + total), color, 2.0)
     half = 0.3 * imgui.get_font_size()
     draw_list.add_triangle_filled((x - half, top), (x + half, top), (x, top + 1.4 * half), color)
-
-
-def _nice_step(smallest: float) -> int:
-    """Return the smallest of 1, 2, 5, 10, 20, 50 … that is at least as large as a number.
-
-    >>> [_nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
-    [1, 2, 5, 20, 100]
-    """
-    power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)
-    return next(f * power for f in (1, 2, 5, 10) if f * power >= smallest - 1e-9)
 
 
 def key_times(actor: Actor, joint: int) -> Floats:

@@ -21,7 +21,7 @@ from viewer.rigs.arrays import Bytes, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import triangle_areas
-from viewer.rigs.number_text import short_number
+from viewer.rigs.number_text import round_step, short_number
 from viewer.rigs.scalars import (
     categories,
     find_quantity,
@@ -190,9 +190,7 @@ def round_ticks(low: float, high: float, signed: bool = False) -> tuple[LegendTi
     >>> [tick.text for tick in round_ticks(0.0, 12.3)]
     ['0', '5', '10']
     """
-    least = (high - low) / (_MOST_TICKS - 1)
-    power = 10.0 ** math.floor(math.log10(least))
-    step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= 0.999 * least)
+    step = round_step((high - low) / (_MOST_TICKS - 1))
     digits = max(0, -math.floor(math.log10(step) + 1e-9))
     numbers = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
     ticks = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import lru_cache
 
@@ -17,6 +16,7 @@ from viewer.rendering.view import View, set_model
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import box_size
+from viewer.rigs.number_text import round_step
 
 LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
@@ -29,10 +29,7 @@ def grid_step(box: Floats) -> float:
     >>> grid_step(np.array([[0.0, 0.0, 0.0], [0.0, 1.6, 0.0]]))
     0.2
     """
-    wanted = (box_size(box) or 1.0) / 8.0
-    power = 10.0 ** math.floor(math.log10(wanted))
-    step = next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted * 0.999)
-    return float(f"{step * power:.6g}")
+    return round_step((box_size(box) or 1.0) / 8.0)
 
 
 class GroundPass:
