@@ -127,6 +127,26 @@ def test_divider_shows_a_figure_on_each_side_in_one_place(browser, tmp_path):
 
 
 @needs_chromium
+@pytest.mark.parametrize("width", [320, 360, 1000])
+def test_angles_stand_beside_their_sliders(browser, tmp_path, width):
+    still(tmp_path / "a.html", bent(5, "a"))
+    screen = {"width": width, "height": 640, "deviceScaleFactor": 1, "mobile": width < 1000}
+    browser.send("Emulation.setDeviceMetricsOverride", **screen)
+    browser.open(tmp_path / "a.html")
+    browser.run("document.getElementById('joints').open = true")
+    rows = browser.run(
+        "[...document.querySelectorAll('#dofs label')].map(row => [...row.children].map("
+        "each => each.getBoundingClientRect().toJSON()))"
+    )
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    assert len(rows) == 3
+    for row in rows:
+        slider, angle = row[-2:]
+        assert slider["right"] <= angle["left"] < angle["right"] <= width
+        assert slider["top"] < 0.5 * (angle["top"] + angle["bottom"]) < slider["bottom"]
+
+
+@needs_chromium
 def test_long_names_stay_within_a_narrow_screen(browser, tmp_path):
     first, second = bent(5, 20 * "first "), bent(6, 20 * "second ")
     still(tmp_path / "a.html", first, second, page=PageOptions(wipes=True))
