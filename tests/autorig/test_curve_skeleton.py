@@ -203,7 +203,7 @@ def test_legs_of_a_chair_are_limbs_although_the_seat_is_wider_than_they_are_long
     legs = [box((x - 0.1, y, z - 0.1), (x + 0.1, 1.1, z + 0.1)) for x, y, z in feet]
     chair = found(united(seat, back, *legs))
     joints = joints_of(chair.figure.skeleton)
-    ends = [place for name, place in joints.items() if name.endswith("_end")]
+    ends = [place for name, place in joints.items() if name.endswith("_end") and place[1] < 2.0]
     for foot in feet:
         assert min(np.linalg.norm(end - foot) for end in ends) < 0.3
     assert len(ends) == 4 and joints["root"][1] > 1.0
@@ -284,6 +284,39 @@ def test_trunk_between_two_limbs_has_the_root_if_it_is_thicker(monkeypatch):
     # A snake has its root at its thicker end.
     snake = joints_of(found(pipe([(0, 0, 0), (0, 0, 4)], 0.12, end_radius=0.06)).figure.skeleton)
     assert snake["root"][2] < 0.4
+
+
+def test_thin_parts_without_bones_are_reported_with_their_part_of_the_surface(monkeypatch):
+    half_resolution(monkeypatch)
+    # A body with a tail, which has bones, and a fin on its back, which has none.
+    body = pipe([(0, 0, -0.6), (0, 0, 0.6)], 0.5, around=16)
+    tail = pipe([(0, 0, -0.8), (0, 0, -2.4)], 0.12)
+    fin = box((-0.06, 0.3, -0.5), (0.06, 0.95, 0.5))
+    said = [str(line) for line in found(united(body, tail, fin)).lines]
+    (line,) = [each for each in said if each.startswith("without joints")]
+    # The fin is 1 long and stands out by 0.45: both of its sides, and its edges.
+    area = 2 * 0.45 * 1.0 + 0.12 * (1.0 + 2 * 0.45)
+    total = (
+        area + 2 * np.pi * 0.5 * 1.2 + 2 * np.pi * 0.5 * 0.5 * np.sqrt(2) + 2 * np.pi * 0.12 * 1.4
+    )
+    share, place = re.search(r"1 thin part, (\d+)% of the surface, the largest at ([-\d., ]+);",
+                             line).groups()  # fmt: skip
+    assert abs(float(share) / 100 - area / total) < 0.05
+    assert_allclose([float(x) for x in place.split(",")], [0.0, 0.73, 0.0], atol=0.1)
+    assert not [each for each in found(united(body, tail)).lines if "without joints" in str(each)]
+
+
+def test_legs_of_a_table_are_pairs_around_its_middle(monkeypatch):
+    half_resolution(monkeypatch)
+    # The deepest places are where the top and the legs meet, which are thicker than it.
+    feet = [(x, 0.0, z) for x in (-1.05, 1.05) for z in (-0.55, 0.55)]
+    legs = [box((x - 0.1, y, z - 0.1), (x + 0.1, 1.05, z + 0.1)) for x, y, z in feet]
+    table = found(united(box((-1.2, 1, -0.7), (1.2, 1.12, 0.7)), *legs))
+    joints = joints_of(table.figure.skeleton)
+    assert_allclose(joints["root"], [0.0, 1.06, 0.0], atol=0.25)
+    assert {f"leg_{k}_{side}" for k in (1, 2) for side in ("left", "right")} <= {*joints}
+    # The top is the trunk, and needs no joints.
+    assert not [line for line in table.lines if "far from the skeleton" in str(line)]
 
 
 def test_corners_of_a_cut_are_no_limbs():

@@ -56,6 +56,9 @@ _APART, _FEW = 3.0, 0.02  # distance in voxels from the solid, and fraction of t
 # Distance from the skeleton, relative to its half width and to the largest radius of the solid, and
 # fraction of the solid there for which sheets are reported.
 _FAR, _MISSED = 2.0, 0.1
+# Radius of what is thin, such as a fin, relative to the largest one, and fraction of the surface
+# from which it is reported if it has no joints.
+_SLIM, _SEEN = 0.5, 0.02
 _MOST_LOOPS = 20  # loops that are cut: each takes a search
 # Length of the corners of a cut, which are no limbs, and their distance from its middle: relative
 # to its half width.
@@ -64,6 +67,10 @@ _SAME = 2.0  # distance in voxels up to which cuts are one: some need two search
 # Least radius, relative to the largest one, of the place where the search for the trunk begins: the
 # deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
 _DEEP = 0.75
+# Distance from a hub at which a limb begins, relative to the radius there, from which the trunk is
+# a plate: it is 1 in a ball.
+_PLATE = 4.0
+_ROUNDS = 4  # searches from the trunk: each finds the middle of a plate better
 _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
 
 # Limbs.
@@ -106,6 +113,7 @@ _END = 0.5  # distance of the last joint from the tip, relative to the half widt
 # asymmetric pose, if at least half of its tips are those of pairs.
 _SYMMETRIC, _POSED = 0.85, 0.5
 _CENTRAL = 1.5  # distance from the plane, in voxels or half widths, up to which a limb is central
+_AROUND_MIDDLE = 0.25  # the same of the root, relative to where the first limb begins
 _MIRRORED = 1.5  # distance of a limb's path from the mirrored one, likewise
 _SAMPLES = 64  # points of paths that are compared
 _ON_GROUND = 0.12  # height of the tip of a leg, relative to the solid's, as in ``anatomy``
@@ -191,7 +199,7 @@ class _Field:
             if loop is None:
                 break
             above, below = (np.isin(self._levels.labels, part) for part in loop)
-            ends = None if len(self.cuts) == _MOST_LOOPS else paths.cut(above, below)
+            ends = None if paths.n_cuts >= _MOST_LOOPS else paths.cut(above, below)
             if ends is None:
                 self.has_loops = True
                 break
@@ -393,12 +401,20 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     report_fraction(0.1)
     tree = tree_of(solid, paths, source)
     report_fraction(0.4)
-    root = source if len(tree.chains) == 0 else _trunk(solid, paths, tree, centers @ up)
-    if root == source:
-        return tree
-    # Loops stay cut.
-    again = tree_of(solid, paths, root)
-    return replace(again, cuts=np.concatenate([tree.cuts, again.cuts]))
+    root: int | None = source
+    if len(tree.chains):
+        root = _trunk(solid, paths, tree, centers @ up)
+        if root == source:
+            root = _middle_of_plate(solid, tree)
+    cuts = [tree.cuts]
+    for _ in range(_ROUNDS):
+        if root is None or root == tree.rows[0]:
+            break
+        # Loops stay cut.
+        tree = tree_of(solid, paths, root)
+        cuts.append(tree.cuts)
+        root = _middle_of_plate(solid, tree)
+    return replace(tree, cuts=np.concatenate(cuts))
 
 
 def _is_deep(solid: Solid) -> Bools:
@@ -441,6 +457,24 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
         before = count - sum(beyond) if hub else 0
         most.append((max([before, *beyond]), -float(tree.radii[hub])))
     return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
+
+
+def _middle_of_plate(solid: Solid, tree: Tree) -> int | None:
+    """Return the voxel in the middle of a trunk that is a plate, as a table's; None for others."""
+    limbs = [chain for chain in tree.chains if chain.start == 0]
+    if len(limbs) < 3 or np.median([limb.begin for limb in limbs]) <= _PLATE * tree.radii[0]:
+        return None
+    # The deepest place may be where the plate and one leg meet.
+    bases = [at_lengths(limb.points, np.array([limb.begin]))[0] for limb in limbs]
+    return _deepest_near(solid, np.mean(bases, axis=0))
+
+
+def _deepest_near(solid: Solid, place: Floats) -> int:
+    """Return the deepest voxel around the one that is nearest to a place (3,)."""
+    centers, radii = solid.centers(solid.voxels), solid.radii()
+    apart = np.linalg.norm(centers - centers[solid.nearest(place[None])[0]], axis=1)
+    near = np.flatnonzero(apart <= radii.max())
+    return int(near[np.lexsort((apart[near], -radii[near]))[0]])
 
 
 def _thicker_end(solid: Solid, paths: Paths, ends: list[int]) -> int:
@@ -847,9 +881,17 @@ def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
         )
     if found.missed > _MISSED:
         yield note(
-            "R016.loops: {missed:.0%} of the mesh is far from the skeleton: wide sheets have no "
-            "joints of their own",
+            "R016.loops: {missed:.0%} of the mesh is far from the skeleton, as wide sheets are, "
+            "and has no joints of its own",
             missed=found.missed,
+        )
+    if len(found.thin):
+        yield note(
+            "R016.thin: without joints: {n}, {share:.0%} of the surface, the largest at {place}; "
+            "--skeleton takes a skeleton that has them",
+            n=counted(len(found.thin), "thin part"),
+            share=float(found.thin.sum()),
+            place=listed([rounded(value) for value in found.thin_at[0].tolist()]),
         )
     if found.pairs and is_assumed:
         yield note(
@@ -880,6 +922,10 @@ class Joints:
     """Number of pairs of them that mirror each other."""
     missed: float
     """Fraction of the solid that is far from the skeleton."""
+    thin: Floats
+    """(T,). Fractions of the surface in thin parts without joints, the largest first."""
+    thin_at: Floats
+    """(T, 3). Their middles."""
     cuts: Floats
     """(C, 3). Places where loops were cut."""
     has_loops: bool
@@ -935,6 +981,7 @@ def joints_in(
             above = len(names) - 1
         if chain.end >= 0:
             joint_of[chain.end] = above
+    thin, thin_at = _thin_parts(solid, parts, np.array(parents), np.array(places))
     return Joints(
         tuple(names),
         np.array(parents, dtype=np.int32),
@@ -942,6 +989,8 @@ def joints_in(
         labels.limbs,
         labels.pairs,
         _missed(solid, tree),
+        thin,
+        thin_at,
         distinct_places(tree.cuts, _SAME * solid.spacing),
         tree.has_loops,
         front,
@@ -964,12 +1013,43 @@ def _missed(solid: Solid, tree: Tree) -> float:
     if len(tree.chains) == 0:
         return 0.0
     points = [tree.hubs, *(chain.points for chain in tree.chains)]
-    widths = [2.0 * tree.radii, *(np.full(len(c.points), c.half_width) for c in tree.chains)]
+    widths = [2.0 * tree.radii]
+    for chain in tree.chains:
+        # The trunk reaches to where the limb begins: the top of a table needs no joints.
+        is_trunk = arc_lengths(chain.points) < chain.begin
+        widths.append(np.where(is_trunk, max(chain.begin, chain.half_width), chain.half_width))
     centers = solid.centers(solid.voxels)
     gaps, nearest = spatial.cKDTree(np.concatenate(points)).query(centers)
     # Inside the trunk, the nearest point may be that of a thin limb.
     wide = np.maximum(_FAR * np.concatenate(widths)[nearest], _FAR * float(solid.radii().max()))
     return float((gaps > wide).mean())
+
+
+def _thin_parts(solid: Solid, parts: Parts, parents: Ints, joints: Floats) -> tuple[Floats, Floats]:
+    """Return the parts of a solid that are thin and have no bone, as fins and the brims of hats.
+
+    ``joints`` (J, 3). Returns fractions of the surface (T,), the largest first, and middles (T, 3).
+    """
+    from scipy import ndimage
+
+    # A ball of half the radius of the trunk does not fit into them: they are not in the opening of
+    # the solid by it, which also lacks the edges of a box.
+    ball = _SLIM * float(solid.radii().max())
+    core = solid.distance >= ball
+    beyond = solid.spacing * ndimage.distance_transform_edt(~core) - ball
+    labels, count = ndimage.label(solid.inside & (beyond > solid.spacing), np.ones((3, 3, 3)))
+    numbers = np.arange(1, count + 1)
+    sticks_out = np.array(ndimage.maximum(beyond, labels, numbers)) >= ball
+    starts, ends = joints[np.maximum(parents, 0)], joints
+    steps = 2 + int(np.linalg.norm(ends - starts, axis=1).max() / solid.spacing)
+    bones = np.linspace(starts, ends, steps).reshape(-1, 3)
+    own = labels[tuple(solid.voxel_of(bones).T)]
+    of_surface = labels[tuple(solid.voxels[parts.rows].T)]
+    shares = np.bincount(of_surface, parts.areas, count + 1)[1:] / parts.areas.sum()
+    found = np.flatnonzero(sticks_out & ~np.isin(numbers, own) & (shares >= _SEEN))
+    found = found[np.argsort(-shares[found], kind="stable")]
+    middles = ndimage.center_of_mass(labels > 0, labels, numbers[found])
+    return shares[found], solid.centers(np.array(middles).reshape(-1, 3))
 
 
 def _symmetry_of(
@@ -978,6 +1058,9 @@ def _symmetry_of(
     """Return the plane of symmetry, None without one, and the pairs of chains."""
     plane, fraction = _plane_of(solid, up, front, symmetry)
     apart = _CENTRAL * max(float(tree.radii[0]), solid.spacing)
+    # The root may be anywhere around the middle of a plate.
+    begins = [chain.begin for chain in tree.chains if chain.start == 0]
+    apart = max(apart, _AROUND_MIDDLE * min(begins, default=0.0))
     if plane is None or abs(float(plane.sides(tree.hubs[0]))) > apart:
         # A plane across the skeleton, as in the middle of a tube, has its root on one side.
         return None, {}

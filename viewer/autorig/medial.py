@@ -33,6 +33,8 @@ class Paths:
         # Close to the surface, the radius is known to half a voxel only.
         wide = np.maximum(self.radii / solid.spacing, 0.5)
         self._graph: csr_array = solid.graph(wide**-_MEDIAL)
+        self.n_cuts = 0
+        """Number of cuts."""
 
     def cut(self, first: Bools, second: Bools) -> Ints | None:
         """Remove the steps between two sets of voxels (N,) each, and return where they began.
@@ -45,6 +47,7 @@ class Paths:
         if csgraph.connected_components(steps, directed=False, return_labels=False) > 1:
             return None
         self.steps, self._graph = steps, _cut(self._graph, first, second)[0]
+        self.n_cuts += 1
         return starts
 
     def to(self, ends: Ints, starts: Ints) -> list[Ints]:
