@@ -216,10 +216,10 @@ def test_person_who_bows_fits_closely(person):
     assert "trunk" not in leaning(person, 60.0, gap=0.009)
 
 
-def raised(person, degrees, neck=0.0):
+def raised(person, degrees, neck=0.0, lean=0.0):
     """Return findings on a rig of the person with raised arms, horizontal at 0.
 
-    ``neck``: length of the neck relative to the person's.
+    ``neck``: length of the neck relative to the person's. ``lean``: rotation of the root, degrees.
     """
     figure, solid = person
     pose = rest_pose(figure.skeleton)
@@ -232,6 +232,7 @@ def raised(person, degrees, neck=0.0):
         way = joints[names.index(f"{side}_wrist")] - joints[names.index(f"{side}_shoulder")]
         now = np.arctan2(way[1], sign * way[0])
         rigged[f"{side}_shoulder"] = [0.0, 0.0, sign * (np.radians(degrees) - now)]
+    rigged["pelvis"] = np.radians([lean, 0.0, 0.0])
     found = judge(figure, pose, rig, rigged, figure.mesh, alignment(0.02), (solid, solid))
     return [each for each in found if each.sentence.startswith("R017.head")]
 
@@ -247,6 +248,9 @@ def test_arms_above_a_head_between_the_shoulders_may_be_ears(person):
     trunk = 0.5 * (at["left_collar"] + at["right_collar"] - at["left_hip"] - at["right_hip"])
     assert high.value - low.value == pytest.approx(arm / np.linalg.norm(trunk), rel=0.05)
     assert low.rating == 1.0 and high.rating == 0.0
+    # Whichever way is up.
+    (lying,) = raised(person, 90.0, lean=90.0)
+    assert lying.value == pytest.approx(high.value, abs=1e-9)
     # A person may raise the arms.
     assert raised(person, 90.0, neck=1.0) == []
 

@@ -340,12 +340,12 @@ def _posture(
         return tuple(found)
     ends = [_end(parents, joints, joint) for joint in arms]
     rises = []
-    for places, vertical in ((joints, axis_direction(template.up)), (rigged, up)):
+    for places in (joints, rigged):
         hips, shoulders, hands = (places[list(each)].mean(axis=0) for each in (legs, arms, ends))
-        length = max(float(np.linalg.norm(shoulders - hips)), 1e-12)
-        middle = 0.5 * (shoulders + hands)
-        points = middle, places[head], shoulders
-        rises.append([float(point @ vertical) / length for point in points])
+        trunk_way = shoulders - hips
+        length = max(float(np.linalg.norm(trunk_way)), 1e-12)
+        points = 0.5 * (shoulders + hands), places[head], shoulders
+        rises.append([float(point @ trunk_way) / length**2 for point in points])
     usual, own = (top - shoulder for _, top, shoulder in rises)
     if own > _NECK * usual:
         return tuple(found)  # people may raise their arms
