@@ -92,7 +92,7 @@ def _scans(figures) -> None:
                 figure,
                 viewer.rest_pose(figure.skeleton),
                 scan_targets.mesh_of(scan),
-                TransferSettings(method=method),
+                TransferSettings(method=method, alignment=AlignmentSettings(up=scan.up)),
             )
             seconds = time.perf_counter() - started
             scores.append(text(score(rigged.weights, scan.weights)))

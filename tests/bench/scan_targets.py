@@ -48,6 +48,8 @@ class Scan:
         Weights of the template's joints.
     pose : Pose
         Pose of the template that matches the scan.
+    up : str
+        Up axis of the positions.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Scan:
     triangles: np.ndarray
     weights: sp.csr_array
     pose: viewer.Pose
+    up: str = "y"
 
 
 def scans() -> list[Scan]:
@@ -121,7 +124,7 @@ def noisy(target: made.Target, rng, name: str) -> Scan:
 
 def z_up(scan: Scan) -> Scan:
     """Return the scan in centimetres with z up and away from the origin."""
-    return replace(scan, positions=scan.positions @ Z_UP.T + [20.0, -35.0, 90.0])
+    return replace(scan, positions=scan.positions @ Z_UP.T + [20.0, -35.0, 90.0], up="z")
 
 
 def holed(scan: Scan) -> Scan:
