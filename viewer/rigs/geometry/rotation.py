@@ -1,4 +1,9 @@
-"""Conversions of rotations: matrices, Euler angles, rotation vectors, quaternions (x, y, z, w)."""
+"""Conversions of rotations: matrices, Euler angles, rotation vectors, quaternions (x, y, z, w).
+
+``scipy.spatial.transform`` makes 24,000 matrices of quaternions or rotation vectors two to four
+times faster, but takes 5 times as long for quaternions of matrices and 30 times for Euler angles,
+and loads for longer than a command takes to start.
+"""
 
 from __future__ import annotations
 
