@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
+from viewer.loading.cleaning import joint_displacement, point_displacement
 from viewer.rigs.captures.points import PointClip
-from viewer.rigs.cleanup.displacement import joint_displacement, point_displacement
 from viewer.rigs.cleanup.frames import (
     Gaps,
     common_frames,
