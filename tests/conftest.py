@@ -18,7 +18,15 @@ pytest_plugins = ["examples", "stored_pictures"]
 
 ROOT = Path(__file__).resolve().parents[1]
 # Folders and files in which every test and example draws, or depends on one that draws.
-DRAWING = ("tests/app/", "tests/rendering/", "viewer/rendering/", "viewer/__init__.py")
+DRAWING = (
+    "tests/app/",
+    "tests/commands/test_pictures.py",
+    "tests/exporters/html/test_page",
+    "tests/rendering/",
+    "viewer/__init__.py",
+    "viewer/commands/_pictures.py",
+    "viewer/rendering/",
+)
 # These tests mostly wait. If they started last, one worker would finish long after the others.
 FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -30,6 +30,7 @@ def formatters(monkeypatch):
     return {kind: show for (kind, _, _), show in known.items()}
 
 
+@pytest.mark.slow
 def test_notebooks_show_a_picture_of_a_scene(formatters):
     data = formatters["image/png"](viewer.load())
     assert data.startswith(b"\x89PNG")
@@ -37,6 +38,7 @@ def test_notebooks_show_a_picture_of_a_scene(formatters):
     assert (width, height) == SIZE
 
 
+@pytest.mark.slow
 def test_notebooks_show_the_page_over_a_picture(formatters, monkeypatch):
     """Where frames are removed, the picture is left; pages beyond the limit are not shown."""
     scene = viewer.load("fox")

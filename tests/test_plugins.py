@@ -85,6 +85,7 @@ def test_tests_of_a_new_plugin_pass(written, tmp_path):
         function(*[folder] * function.__code__.co_argcount)
 
 
+@pytest.mark.slow
 def test_modules_are_imported_when_their_rows_are_used(written, capsys):
     viewer.load("fox")
     assert ".off" in all_suffixes() and "off" not in FORMATS
@@ -429,6 +430,7 @@ def test_wrong_results_of_a_tool_are_refused(install, tmp_path):
         viewer.load(tmp_path / "a.npz")
 
 
+@pytest.mark.slow
 def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install):
     from app.driver import Driver
 
