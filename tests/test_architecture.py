@@ -120,7 +120,6 @@ HOMES = {
         "media/captioned_sheet.py",
         "media/image.py",
         "media/picture_sinks.py",
-        "media/thumbnails.py",
         "rendering/overlay/legend.py",
         "rendering/overlay/typeface.py",
     },

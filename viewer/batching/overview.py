@@ -214,7 +214,7 @@ def _codes(results: Iterable[Result]) -> list[str]:
 
 
 def _picture(result: Result) -> str:
-    from viewer.media.thumbnails import data_uri, thumbnail
+    from viewer.media.captioned_sheet import data_uri, thumbnail
 
     pixels = thumbnail(result.outputs[0], _THUMBNAIL) if result.outputs else None
     return "" if pixels is None else f'<img alt="" src="{data_uri(pixels)}">'
@@ -419,8 +419,7 @@ def _sheet_path(path: Path, number: int) -> Path:
 
 
 def _cell(result: Result) -> CaptionedCell:
-    from viewer.media.captioned_sheet import CaptionedCell
-    from viewer.media.thumbnails import thumbnail
+    from viewer.media.captioned_sheet import CaptionedCell, thumbnail
 
     name = printable(result.item.name, 200)
     if result.status not in _FINISHED:

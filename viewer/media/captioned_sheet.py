@@ -1,4 +1,4 @@
-"""Contact sheets with captions below the pictures, and cells for missing pictures.
+"""Contact sheets with captions, cells for missing pictures, and the thumbnails in them.
 
 Pillow is imported on first use.
 """
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
 
     Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
 
+
+import base64
+import io
+from pathlib import Path
+
+from viewer.errors import FormatError, ViewerError
+from viewer.media.image import decode_picture, is_picture
+from viewer.media.video_kinds import VIDEOS
+from viewer.media.video_reading import VideoFrames
 
 _WIDTH = 240  # width of a cell, pixels
 _HEIGHTS = 120, 320  # minimum and maximum height of a cell's picture
@@ -143,3 +152,52 @@ def elided_end(text: str, width: float, length_of: Callable[[str], float]) -> st
     while text and length_of(text + _ELLIPSIS) > width:
         text = text[:-1]
     return text + _ELLIPSIS
+
+
+# Thumbnails of images and videos, as pixels or as URIs for pages.
+
+_QUALITY = 82  # JPEG quality
+_MOST_BYTES = 256 << 20  # maximum size of a file
+
+
+def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:
+    """Return an image, or a video's middle frame, reduced to fit a box; None if unreadable."""
+    # Pixels are (H, W, 4) uint8, first row at the top. Small images are not enlarged.
+    pixels = _pixels(Path(path))
+    if pixels is None:
+        return None
+    from PIL import Image
+
+    picture = Image.fromarray(pixels)
+    # Premultiplied, so that transparent pixels have no influence on the colours next to them.
+    premultiplied = picture.convert("RGBa")
+    premultiplied.thumbnail(size, Image.Resampling.LANCZOS, reducing_gap=3.0)
+    return np.array(premultiplied.convert("RGBA"))
+
+
+def _pixels(path: Path) -> Bytes | None:
+    try:
+        if path.suffix.lower() in VIDEOS:
+            frames = VideoFrames(path)
+            middle = frames.n_frames // 2 / frames.rate
+            return frames.at(middle) if frames.n_frames else frames.at(0.0)
+        if not path.is_file() or path.stat().st_size > _MOST_BYTES:
+            return None
+        data = path.read_bytes()
+        return decode_picture(path, data) if is_picture(data[:16]) else None
+    except (OSError, FormatError, ViewerError):
+        return None
+
+
+def data_uri(pixels: Bytes) -> str:
+    """Return (H, W, 4) uint8 pixels as a data URI: JPEG, or PNG if transparent."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    if (pixels[..., 3] == 255).all():
+        kind = "jpeg"
+        Image.fromarray(pixels).convert("RGB").save(stream, "JPEG", quality=_QUALITY)
+    else:
+        kind = "png"
+        Image.fromarray(pixels).save(stream, "PNG")
+    return f"data:image/{kind};base64,{base64.b64encode(stream.getvalue()).decode('ascii')}"
