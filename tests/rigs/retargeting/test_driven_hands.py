@@ -221,6 +221,19 @@ def test_hands_give_way_smoothly_as_they_come_to_the_trunk():
         assert 13.0 < changes.moved_out < 15.0 and shaken.max() < 1.56
 
 
+def test_hands_of_long_arms_come_to_the_body_without_a_jerk():
+    # Forearms fold by up to 2.4 radians, so that hands leave the thighs and come back within a few
+    # frames. They are moved by 18 cm at the thighs, and by nothing where they are free.
+    figure = body(arms=1.4)
+    found, clip, changes = kept(figure, motion(1.2, 1.2, down=1.4))
+    assert changes.after < 0.3 * changes.before
+    paths = [places(figure, each)["LeftHand_"] for each in (found.clip, clip)]
+    moved = paths[1] - paths[0]
+    assert 17.0 < np.linalg.norm(moved, axis=1).max() < 19.0
+    # At constant acceleration and deceleration, 18 cm in 5 frames take 4 * 18 / 5^2 a frame.
+    assert np.linalg.norm(np.diff(moved, n=2, axis=0), axis=1).max() < 2.9
+
+
 def shield():
     """Return a third of the tube around the trunk, on the left.
 

@@ -32,7 +32,7 @@ from viewer.rigs.feet.contacts import (
     on_moving_ground,
     step_height,
 )
-from viewer.rigs.feet.curves import envelope, falling, smooth_curves
+from viewer.rigs.feet.curves import envelope, falling, smooth_curves, strength
 from viewer.rigs.feet.legs import Leg, leg_rotations, legs_of, lowering, unscaled
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import (
@@ -74,7 +74,6 @@ _STILL = 10.0
 # weight 1, so the curve obeys s^4 c'''' = -c. Its solution that begins at rest and fades is
 # exp(-a) (cos a + sin a) with a = t / (sqrt(2) s): 70 % after s, 28 % after 2 s, 4 % after 3 s.
 _EASE = 0.15
-_EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3; see _strength
 
 # Like _EASE, for the tilt of a sole and for the limit of a lifted foot, which are quicker.
 _LEVELS = 0.06
@@ -622,7 +621,7 @@ def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 
         weights[[foot, count + foot]] = wanted.holds
     if not plan.is_own:
         targets = _calmed(plan, targets, weights)
-    found = _smoothed(plan, targets, _strength(weights))
+    found = _smoothed(plan, targets, strength(weights))
     # A curve misses its targets by about s^4 over the weight, 1e-5 of its bend for a held foot. A
     # standing foot must be exact, so its rows are set to the targets.
     #
@@ -648,7 +647,7 @@ def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 
         across = np.where(stands, targets[foot], found[foot])
         rise = np.where(stands, held, found[row, :, :1])
         least = np.where(stands, -np.inf, -wanted.above[:, None] - lift[:, None])
-        goals, force = targets[row : row + 1, :, :1].copy(), _strength(weights[row : row + 1])
+        goals, force = targets[row : row + 1, :, :1].copy(), strength(weights[row : row + 1])
         for _ in range(n_lifts):
             missing = (least - rise)[:, 0]
             sinks = missing > 0.0
@@ -676,14 +675,6 @@ def _calmed(plan: _FootPlan, targets: Floats, holds: Floats) -> Floats:
     half = len(targets) // 2
     left[half:] = np.clip(left[half:], -_GAP * plan.size, _GAP * plan.size)
     return targets + left
-
-
-def _strength(holds: Floats) -> Floats:
-    """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
-    # For comparison, s^4 = 6561 (0.15 s at 60 rows per second): a hold of 0.25 weighs 1.25, which
-    # the curve ignores; 0.5 weighs 500, which bends it; 0.75 weighs 7.5e5 and 1 weighs 1e9, which
-    # fix it.
-    return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
 def _smoothed(plan: _FootPlan, targets: Floats, weights: Floats, seconds: float = _EASE) -> Floats:

@@ -28,7 +28,7 @@ from viewer.rigs.feet.body import (
     shape_of,
     spans_of,
 )
-from viewer.rigs.feet.curves import falling
+from viewer.rigs.feet.curves import falling, smooth_curves, strength
 from viewer.rigs.feet.legs import Leg, leg_rotations
 from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
@@ -66,6 +66,8 @@ _TOGETHER, _APART = 0.08, 0.17  # the same for two wrists: 0.06 where hands clap
 # Distance from where a hand should be that is left, so that limbs keep their directions: about 2 %
 # of the height of a person.
 _SLACK = 0.025
+# The length s of the smooth curve of a hand's shift, seconds; as of feet, see ``planting``.
+_EASE = 0.15
 _EXTENDED = 0.97  # maximum extension of an arm: its elbow is bent by 28 degrees
 _SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _SLACK
 # Height of the crown above the head's joint where nothing shows it: 0.11 to 0.2 for people, of whom
@@ -183,6 +185,7 @@ def keep_hands(
     differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
+    shifts = _eased(shifts, nearness, clip.timing)
     shifts = [
         _within_reach(body, arm, _beyond_slack(shift, slack))
         for arm, shift in zip(_ARMS, shifts, strict=True)
@@ -334,6 +337,17 @@ def _rests_on(body: _Body, other: _Body, together: Floats) -> Floats:
 def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
     for part in _PARTS:
         yield from pairwise([name for name in part if name in joints])
+
+
+def _eased(shifts: list[Floats], nearness: list[Floats], timing: Timing) -> list[Floats]:
+    """Return curves (N, 3) through the shifts of hands at the body, which fade around them."""
+    # As of planted feet: a row is held the more firmly, the nearer the hand is.
+    targets, holds = np.stack(shifts), np.stack(nearness)
+    result = np.empty_like(targets)
+    for start, stop in spans_of(timing):
+        rows = targets[:, start:stop], strength(holds[:, start:stop])
+        result[:, start:stop] = smooth_curves(*rows, _EASE * timing.frame_rate)
+    return list(result)
 
 
 def _beyond_slack(shift: Floats, slack: Floats) -> Floats:
