@@ -27,7 +27,7 @@ from viewer.errors import RigError
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.rigs.figure import figure_pose
 from viewer.rigs.pose import rest_pose
-from viewer.rigs.skin import skin_from_entries
+from viewer.rigs.skin import owners, skin_from_entries
 from viewer.rigs.skinning import joint_matrices
 
 PARENTS = np.array([-1, 0, 1])
@@ -149,6 +149,31 @@ def test_test_pose_finds_weights_that_do_not_bend():
     expected = np.cos(np.radians(20.0)) ** 2
     template = values(target)["volume"].value
     assert found["volume"].value == pytest.approx(expected * template, rel=0.05)
+
+
+@pytest.mark.parametrize("inside_out", [False, True])
+def test_open_sheet_beside_a_bar_has_no_volume(inside_out):
+    whole = body()
+    # A square of 3 x 3 that turns with the end of the bar, whose volume is 0.3.
+    corners = np.array([[1.5, -1.5, 1], [1.5, 1.5, 1], [4.5, 1.5, 1], [4.5, -1.5, 1]])
+    count = len(whole.positions)
+    rows = np.append(owners(whole.skin), count + np.arange(4))
+    skin = skin_from_entries(
+        count + 4,
+        rows,
+        np.append(whole.skin.joints, np.full(4, 1)),
+        np.append(whole.skin.weights, np.ones(4)),
+        np.tile(np.eye(4), (3, 1, 1)),
+    )
+    triangles = whole.triangles[:, ::-1] if inside_out else whole.triangles
+    both = Body(
+        np.concatenate([whole.positions, corners]),
+        np.concatenate([triangles, count + np.array([[0, 1, 2], [0, 2, 3]])]),
+        skin,
+        JOINTS,
+        whole.solid,
+    )
+    assert values(both)["volume"].value == pytest.approx(values(whole)["volume"].value)
 
 
 def test_a_shape_without_limbs_must_agree_more_closely():

@@ -37,6 +37,7 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.autorig.anatomy import LimbPair, arc_lengths
 from viewer.autorig.solid import Solid, solid_of
+from viewer.autorig.surface.welding import weld
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
@@ -44,9 +45,10 @@ from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.topology import part_volumes
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import descendants
-from viewer.rigs.mesh import Mesh, triangle_areas, volume
+from viewer.rigs.mesh import Mesh, triangle_areas
 from viewer.rigs.pose import Pose
 from viewer.rigs.retargeting.mirror import joint_partners
 from viewer.rigs.skin import Skin
@@ -423,7 +425,16 @@ def _thickness(body: Body) -> float:
 
 def _kept(body: Body, parents: Ints, bones: Ints) -> float:
     """Return the fraction of the volume that remains if all joints bend, the lower of two poses."""
-    before = volume(body.positions, body.triangles)
+    mesh = weld(body.positions, body.triangles)
+    islands = mesh.islands[mesh.vertices[body.triangles[:, 0]]]
+
+    def volume(positions: Floats) -> float:
+        # Each part about its own middle: an open sheet, such as a cape, has a volume of nearly 0
+        # there, but any other one elsewhere. Parts that are inside out count, too.
+        corners = positions[body.triangles]
+        return float(np.abs(part_volumes(corners, islands, mesh.n_islands)[0]).sum())
+
+    before = max(volume(body.positions), 1e-300)
     axis = np.zeros((len(parents), 3))
     along = unit(body.joints[bones[:, 1]] - body.joints[bones[:, 0]])
     axis[bones[:, 0]] = along
@@ -440,5 +451,5 @@ def _kept(body: Body, parents: Ints, bones: Ints) -> float:
             if parent >= 0:
                 moves[joint] = moves[parent] @ moves[joint]
         posed = move(body.positions, body.skin, moves)[0]
-        found.append(volume(posed, body.triangles) / before)
+        found.append(volume(posed) / before)
     return min(found)
