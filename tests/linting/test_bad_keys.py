@@ -75,6 +75,17 @@ def pop_in_a_twist(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> 
     bends[30] += 24.0
 
 
+def pop_of_a_quick_limb(n_frames: int) -> Change:
+    """A swing of 25 degrees 2.5 times a second: steps of up to 13 degrees, differences d of 6.7."""
+    middle = 30.0 + 0.5 * (n_frames - 1)
+
+    def change(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+        bends[:] = 40.0 + 25.0 * np.sin(2.0 * np.pi * (K - middle) / 12.0)
+        bends[30 : 30 + n_frames] += 15.0
+
+    return change
+
+
 def spike(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     moves[30, 0, 0] += 0.4
 
@@ -114,6 +125,10 @@ FAULTS = {
     "pop of 15 degrees": (pop(-15.0), "C020.rotation", [3], {"size": "15°"}, [30]),
     "pop of two frames": (pop_for_two, "C020.rotation", [3], {"size": "50°"}, [30]),
     "pop of a fast joint": (pop_in_a_twist, "C020.rotation", [3], {"size": "24°"}, [30]),
+    "pop of a quick limb": (pop_of_a_quick_limb(1), "C020.rotation", [3], {}, [30]),
+    "pop of a quick limb for two frames": (
+        pop_of_a_quick_limb(2), "C020.rotation", [3], {}, [30]
+    ),
     "spike": (spike, "C020.position", [0], {"size": "400 mm"}, [30]),
     "frozen": (freeze, "C021.frames", [], {"ranges": ["frames 27 to 38"]}, [*range(27, 39)]),
     "frozen at the peak": (
@@ -125,7 +140,7 @@ FAULTS = {
     "scaled": (grow, "C023.scales", [2], {"ratio": "1.4"}, [*range(39, 60)]),
     "scaled throughout": (be_large, "C023.scales", [2], {"ratio": "1.4"}, [*range(60)]),
     "trembling": (tremble, "C014.rotation", [3], {"usual": "0.0°"}, None),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("is_captured", [False, True])
@@ -150,6 +165,18 @@ def nothing(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
 def strike(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     """A blow: 60 degrees within two frames, which stops at once."""
     bends[:] = np.interp(K, [0, 30, 32, 59], [20.0, 10.0, 70.0, 72.0])
+
+
+def strike_and_stop(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """A blow that gets faster until it stops within a frame, as of a knight."""
+    steps = np.zeros(FRAMES)
+    steps[26:30] = 6.0, 12.0, 17.0, 41.0
+    bends[:] = 10.0 + np.cumsum(steps)
+
+
+def swing(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """2.5 times a second, up to 13 degrees a frame."""
+    bends[:] = 40.0 + 25.0 * np.sin(2.0 * np.pi * K / 12.0)
 
 
 def hold(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
@@ -180,7 +207,9 @@ def walk(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("is_captured", [False, True])
-@pytest.mark.parametrize("change", [nothing, strike, hold, snap, flap, straighten, walk])
+@pytest.mark.parametrize(
+    "change", [nothing, strike, strike_and_stop, swing, hold, snap, flap, straighten, walk]
+)
 def test_sound_motion_has_no_finding(change, is_captured):
     assert linted(change, is_captured) == []
 
