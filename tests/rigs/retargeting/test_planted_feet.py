@@ -176,11 +176,13 @@ def test_figure_with_the_proportions_of_the_source_is_unchanged():
     assert changes is None and clip is found.clip
 
 
-def test_figure_with_high_ankles_stands_on_the_ground_of_a_source_without_toes():
-    # The ankles of the source are 8 cm above the ground, those of the figure 22 cm more.
-    figure = person(1.15, 0.85, 1.0, 1.4, lift=22.0)
+@pytest.mark.parametrize(("lift", "rise"), [(22.0, 0.0), (0.0, 20.0)])
+def test_feet_stand_on_the_ground_of_a_source_without_toes(lift, rise):
+    # The ankles of the figure or of the source, 8 cm above the ground else, are higher than those
+    # of the other.
+    figure = person(1.15, 0.85, 1.0, 1.4, lift=lift)
     rotations, path = walk()
-    full = written(t_pose(), rotations, path, rate=RATE)
+    full = written(t_pose(), rotations, path + rise * Y, rate=RATE)
     skeleton = full.figure.skeleton
     kept = [j for j, name in enumerate(skeleton.names) if not name.endswith("ToeBase")]
     names = tuple(skeleton.names[joint] for joint in kept)

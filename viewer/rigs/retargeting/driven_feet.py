@@ -29,6 +29,9 @@ _ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
 _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 # Percentage of the heights of two feet that are lower where a foot stands: lower ones are noise.
 _STANDING = 5.0
+# Height of a ground above which it is no ground at height 0, if the soles are not known, relative
+# to the body: ankles of chibis are as high as half of their legs, a quarter of this size.
+_LOW_GROUND = 0.2
 _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
@@ -48,7 +51,8 @@ def plant_feet(
     report(1, STEPS, "steps", "planting the feet")
     source = in_frame_order(found.source.clip)
     worlds = body.worlds(clip)
-    feet = _source_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
+    own = body.feet_from_ankles(worlds)
+    feet = _source_paths(found, source, pairs, own, rest_up, body.size)
     planted, changes = plant(clip, body, worlds, up, feet)
     return (planted if changes.is_better else found.clip), changes
 
@@ -108,6 +112,7 @@ def _source_paths(
     pairs: list[_LegPair],
     vectors: list[tuple[Floats, Floats]],
     up: Floats,
+    size: float,
 ) -> list[FootPath]:
     """Return the source's feet in the figure's axes and unit, shaped as the figure's if unknown."""
     skeleton = found.source.figure.require_skeleton()
@@ -139,10 +144,10 @@ def _source_paths(
         result.append(FootPath(ball, heel @ axes.T, above))
     if len(ankles) < len(pairs):
         return result
-    # The figure's feet may be higher than the source's: soles below a ground at height 0, above
-    # which the ankles are, stand on it.
+    # The feet of the figure may be higher or lower than those of the source, whose soles are not
+    # known: if its ankles are a little above height 0, the ground is there.
     low = float(np.percentile([path.lowest(up) for path in result], _STANDING))
-    if not low < 0.0 < np.percentile(ankles, _STANDING):
+    if not (np.percentile(ankles, _STANDING) > 0.0 and low < _LOW_GROUND * size):
         return result
     return [FootPath(path.toe - low * up, path.heel - low * up, path.hip) for path in result]
 
