@@ -9,7 +9,7 @@ from rendering.drawn_figures import random_figure, random_pose
 
 from viewer.exporters.html.motion import _pack_fields, tracks_of
 from viewer.exporters.html.offsets import principal_fields
-from viewer.exporters.html.packing import Packer, unpacked
+from viewer.exporters.html.packing import Packer, earlier_corners, unpacked
 from viewer.rigs.blendshapes import Correctives
 from viewer.rigs.shape import pose_weights
 from viewer.rigs.skinning import Skinning
@@ -58,6 +58,53 @@ def test_smooth_tracks_need_few_bytes():
     packer = Packer()
     packer.add(np.arange(1000.0)[:, None] ** 2 * [1.0, -3.0])
     assert packer.items[0]["order"] == 2 and len(packer.text()) < 100
+
+
+def grid(rows, columns):
+    """Triangles of a grid of vertices, numbered row by row, and the places (V, 2) of these."""
+    places = np.stack(np.divmod(np.arange(rows * columns), columns), axis=1)
+    first = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].reshape(-1, 1)
+    squares = first + np.array([[0, 1, columns + 1, columns]])
+    return np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]), places
+
+
+def test_vertices_are_predicted_from_triangles_before_them():
+    """Two squares beside each other::
+
+    3 - 4 - 5        triangles 0 1 4, 0 4 3, 1 2 5, 1 5 4
+    | / | / |
+    0 - 1 - 2
+    """
+    near = earlier_corners(np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]), 7)
+    assert near[5].tolist() == [1, 4, 0]
+    # The others have the last neighbour before them, or the vertex before.
+    assert near[[0, 1, 2, 3, 4, 6]].tolist() == [[each] * 3 for each in (0, 0, 1, 0, 3, 5)]
+    # 3 and 2 are opposite corners of the edge 0 1.
+    assert earlier_corners(np.array([[0, 1, 2], [1, 0, 3]]), 4)[3].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_predictions_use_vertices_before_only(seed):
+    random = np.random.default_rng(seed)
+    triangles = random.integers(0, 30, size=(200, 3))  # also degenerate ones, and edges of many
+    near = earlier_corners(triangles, 33)
+    assert (near[1:] < np.arange(1, 33)[:, None]).all() and (near >= 0).all()
+
+
+def test_smooth_values_of_a_mesh_need_fewer_bytes_and_stay_exact():
+    triangles, places = grid(300, 4)
+    waves = np.sin(places @ np.random.default_rng(1).normal(size=(2, 60)) * 0.2)
+    packers = Packer(), Packer()
+    packers[0].add(waves, 1e-3)
+    packers[1].add(waves, 1e-3, earlier_corners(triangles, len(places)))
+    assert "near" in packers[1].items[-1]
+    plain, meshed = read_back(packers[0])[0], read_back(packers[1])[-1]
+    assert_array_equal(meshed, plain)
+    assert len(packers[1].text()) < 0.9 * len(packers[0].text())
+    # Where it saves nothing, nothing is added.
+    packer, noise = Packer(), np.random.default_rng(2).normal(size=waves.shape)
+    packer.add(noise, 1e-3, earlier_corners(triangles, len(places)))
+    assert len(packer.items) == 1
 
 
 def test_numbers_far_from_the_origin_keep_their_step():
@@ -132,7 +179,8 @@ def test_sums_of_rounded_fields_are_as_exact_as_asked_but_not_much_more(sizes):
     low, high = np.broadcast_to(sizes, 2)
     weights = random.uniform(-1.0, 1.0, (50, 40)) * np.geomspace(low, high, 40)
     fields, packer, motion = random.normal(size=(40, 600, 3)), Packer(), {}
-    _pack_fields(("weights", "fields"), weights, fields, error, packer, motion)
+    near = earlier_corners(np.zeros((0, 3), np.int32), fields.shape[1])
+    _pack_fields(("weights", "fields"), weights, fields, near, error, packer, motion)
     rows = unpacked(packer.items, packer.text())[motion["fields"]].reshape(600, 40, 3)
     apart = np.abs(np.einsum("fk,vka->fva", weights, rows - np.moveaxis(fields, 0, 1)))
     assert 0.5 * error < apart.max() < 1.1 * error

@@ -148,6 +148,26 @@ def test_shapes_and_correctives_move_the_rest_vertices(browser, tmp_path):
     assert browser.messages == []
 
 
+@needs_chromium
+def test_smooth_correctives_of_a_mesh_are_exact(browser, tmp_path):
+    """They are stored as differences from parallelograms of the mesh."""
+    places = np.stack(np.divmod(np.arange(1200), 4), axis=1)
+    first = np.arange(1200).reshape(300, 4)[:-1, :-1].reshape(-1, 1)
+    squares = first + np.array([[0, 1, 5, 4]])
+    triangles = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]).astype(np.int32)
+    plain, random = tangle(n_joints=4, n_influences=2, n_vertices=1200), np.random.default_rng(11)
+    waves = np.sin(np.einsum("va,ka->kv", places, random.normal(size=(81, 2)) * 0.1))
+    offsets = waves.reshape(27, 3, 1200).transpose(0, 2, 1) * 0.05
+    correctives = viewer.rigs.blendshapes.Correctives(offsets)
+    mesh = replace(plain.mesh, triangles=triangles, triangle_materials=None, triangle_parts=None)
+    figure = replace(plain, mesh=mesh, correctives=correctives)
+    (animation,), _ = write(tmp_path / "a.html", moving(figure, n_frames=30))
+    assert '"near":' in (tmp_path / "a.html").read_text("utf-8")
+    browser.open(tmp_path / "a.html")
+    check_frames(browser, animation, Skinning(), [0, 13, 29])
+    assert browser.messages == []
+
+
 def check_normals(browser, animation, frames):
     """Compare the unit normals of the shader with the float64 reference."""
     for frame in frames:

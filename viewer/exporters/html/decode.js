@@ -11,9 +11,10 @@ async function inflate(text) {
 }
 
 // Returns an array as {rows, columns, values}; the values are row by row, as 64-bit floats.
-function unpackArray(item, bytes) {
+function unpackArray(item, bytes, items) {
   const [rows, columns] = item.shape, count = rows * columns;
   const values = new Float64Array(count), column = new Int32Array(rows);
+  const near = item.near === undefined ? null : unpackArray(items[item.near], bytes, items).values;
   for (let c = 0; c < columns; ++c) {
     for (let r = 0; r < rows; ++r) {
       let coded = 0;
@@ -23,6 +24,8 @@ function unpackArray(item, bytes) {
     }
     for (let order = 0; order < item.order; ++order)
       for (let r = 1; r < rows; ++r) column[r] += column[r - 1];  // wraps around at 32 bits
+    for (let r = 1, at = 3; near && r < rows; ++r, at += 3)  // the rest of a parallelogram
+      column[r] += column[r - near[at]] + column[r - near[at + 1]] - column[r - near[at + 2]];
     const step = Array.isArray(item.step) ? item.step[c] : item.step;
     const origin = Array.isArray(item.origin) ? item.origin[c] : item.origin;
     for (let r = 0; r < rows; ++r) values[r * columns + c] = column[r] * step + origin;
@@ -36,7 +39,7 @@ async function unpackAll(items, text) {
   // Textures begin at their last row, and must keep the colours of transparent pixels.
   const how = { imageOrientation: "flipY", premultiplyAlpha: "none", colorSpaceConversion: "none" };
   return Promise.all(items.map((item) => {
-    if (item.shape) return unpackArray(item, bytes);
+    if (item.shape) return unpackArray(item, bytes, items);
     const file = bytes.subarray(item.at, item.at + item.size);
     return createImageBitmap(new Blob([file], { type: item.type }), how);
   }));

@@ -13,9 +13,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.exporters.html.offsets import Fields, principal_fields
-from viewer.exporters.html.packing import Packer
+from viewer.exporters.html.packing import Packer, earlier_corners
 from viewer.progress import report
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.figure import Figure
 from viewer.rigs.file_record import Json
@@ -23,7 +23,7 @@ from viewer.rigs.geometry.quaternion import align_signs
 from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.material import Material
-from viewer.rigs.mesh import bounding_box, box_size
+from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.shape import pose_weights, rest_joints, shaped, shaped_skeleton, shaped_skin
 from viewer.rigs.skeleton import FIRST_ROTATION
@@ -263,7 +263,8 @@ def pack_tracks(tracks: Tracks, packer: Packer) -> Json:
     if n_joints and not (is_bound and np.abs(tracks.joints - tracks.places).max() <= 0.5 * fine):
         motion["joints"] = packer.add(tracks.joints, fine)
     if tracks.surface is not None:
-        _pack_surface(tracks.surface, fine, packer, motion)
+        assert mesh is not None  # the surface is that of the mesh
+        _pack_surface(tracks.surface, mesh, fine, packer, motion)
     return motion
 
 
@@ -328,19 +329,22 @@ def pose_values(figure: Figure, pose: Pose, how: Skinning, center: Floats) -> di
     return {name: values.reshape(-1) for name, values in found.items()}
 
 
-def _pack_surface(surface: RestSurface, fine: float, packer: Packer, motion: Json) -> None:
+def _pack_surface(
+    surface: RestSurface, mesh: Mesh, fine: float, packer: Packer, motion: Json
+) -> None:
     """Add what changes the rest surface to the members of the figure's ``motion``."""
     both = surface.shapes, surface.correctives
+    near = earlier_corners(mesh.triangles, mesh.n_vertices)
     fields = np.concatenate([each.fields for each in both])
     if len(fields):
         weights = np.concatenate([each.weights for each in both], axis=1)
         motion["nShapes"] = len(surface.shapes.fields)
         error = _SHARE_OF_FIELDS * fine
-        _pack_fields(("weights", "fields"), weights, fields, error, packer, motion)
+        _pack_fields(("weights", "fields"), weights, fields, near, error, packer, motion)
     turns = surface.normal_fields
     if len(turns.fields):
         names = "normalWeights", "normalFields"
-        _pack_fields(names, turns.weights, turns.fields, _NORMAL_TOLERANCE, packer, motion)
+        _pack_fields(names, turns.weights, turns.fields, near, _NORMAL_TOLERANCE, packer, motion)
     if surface.recomputed.any():
         motion["recomputed"] = packer.add(surface.recomputed)
 
@@ -349,6 +353,7 @@ def _pack_fields(
     names: tuple[str, str],
     weights: Floats,
     fields: Floats,
+    near: Ints,
     fine: float,
     packer: Packer,
     motion: Json,
@@ -368,4 +373,4 @@ def _pack_fields(
     peak = np.sqrt(np.square(weights / used).mean(axis=1).max(initial=1.0))
     coarse = fine * np.sqrt(12.0) / (_DEVIATIONS * peak * np.sqrt(count) * used)
     rows = np.moveaxis(fields, 0, 1).reshape(fields.shape[1], -1)
-    motion[names[1]] = packer.add(rows, np.repeat(coarse, 3))
+    motion[names[1]] = packer.add(rows, np.repeat(coarse, 3), near)
