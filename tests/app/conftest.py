@@ -42,7 +42,7 @@ def hand(drive, rig):
 def drive_body(drive, tmp_path):
     """Open apps that show a synthetic body model: "box" or a kind of the SMPL family."""
 
-    def open_body(kind="box", size=(1000, 1000), pixels_per_point=0.5, **columns):
+    def open_body(kind="box", size=(1000, 1000), pixels_per_point=0.25, **columns):
         arrays = box_body.arrays() if kind == "box" else model(kind, **columns)
         path = tmp_path / f"{kind}.npz"
         np.savez(path, **arrays)
@@ -52,16 +52,26 @@ def drive_body(drive, tmp_path):
 
 
 @pytest.fixture
-def curves(drive, rig, tmp_path):
-    """A test driver on the Curves panel of the tiny rig; the arm's curves are shown."""
-    (tmp_path / "wave.anim").write_text(clip_text())
-    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1, pixels_per_point=1.0)
-    hand.show_panel("Curves")
-    hand.state.selected_joint = 1
-    hand.step(3)
-    hand.click("curve arm.x")
-    hand.step(3)
-    return hand
+def show_curves(drive, rig, tmp_path):
+    """Open apps on the Curves panel of the tiny rig; the arm's curves are shown."""
+
+    def open_panel(**settings):
+        (tmp_path / "wave.anim").write_text(clip_text())
+        hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, **settings)
+        hand.show_panel("Curves")
+        hand.state.selected_joint = 1
+        hand.step(3)
+        hand.click("curve arm.x")
+        hand.step(3)
+        return hand
+
+    return open_panel
+
+
+@pytest.fixture
+def curves(show_curves):
+    """A test driver on the Curves panel of the tiny rig."""
+    return show_curves()
 
 
 @pytest.fixture

@@ -78,7 +78,7 @@ class Driver:
         self._is_open = True
         imgui.load_ini_settings_from_memory(layout)
         try:
-            self.step(4)
+            self.step(3)
         except BaseException:
             # An app that stays open makes all later tests fail.
             self.close()

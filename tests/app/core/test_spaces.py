@@ -78,7 +78,7 @@ def test_clean_up_also_applies_to_the_other_space(scene):
 
 
 def test_panel_switches_the_space_and_keeps_time_selection_colour_and_camera(drive, scene):
-    driver = drive(scene=scene, size=(1000, 900), pixels_per_point=1.0)
+    driver = drive(scene=scene, size=(1000, 900))
     state = driver.state
     driver.show_panel("Actors")
     state.clock.seek(4 / 30)

@@ -181,7 +181,8 @@ def test_extreme_times_and_values_are_harmless(curves):
 
 
 @pytest.mark.golden("app_curves")
-def test_curves_panel_matches_golden_image(curves):
+def test_curves_panel_matches_golden_image(show_curves):
+    curves = show_curves(pixels_per_point=1.0)
     curves.click("curves of arm")
     curves.state.clock.seek(0.5)
     curves.step(3)

@@ -320,7 +320,8 @@ def draw_setting(
             low, high = facts["limits"]
             new = slider(state, label, value, low, high, facts.get("unit", "%.2f"), flags)
         explain(text, why)
-    setattr(settings, name, new)
+    if new != value:
+        setattr(settings, name, new)
 
 
 def swatch(color: Sequence[float]) -> None:
