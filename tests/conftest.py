@@ -11,6 +11,7 @@ from pathlib import Path
 
 import moderngl
 import pytest
+from _pytest.runner import runtestprotocol
 from hypothesis import settings
 from run_time import RunTime
 
@@ -49,6 +50,21 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
         return None
     path = collection_path.relative_to(ROOT).as_posix()
     return f"{path}/".startswith(DRAWING) or path in DRAWING or None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Report a test that passes to the controller once, not for each of its phases."""
+    if not hasattr(item.config, "workerinput"):
+        return None
+    reports = runtestprotocol(item, log=False, nextitem=nextitem)
+    if len(reports) == 3 and all(report.passed for report in reports):
+        call = reports[1]
+        call.duration = sum(report.duration for report in reports)
+        reports = [call]
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    return True
 
 
 def pytest_collection_finish() -> None:
