@@ -33,7 +33,9 @@ def twins():
     """The bundled body, fitted to the robot."""
     figure = load(bundled_body()).actors[0].figure
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("viewer.autorig.alignment.pose_fit._VERTICES", 400)
+        patch.setattr("viewer.autorig.alignment.pose_fit._VERTICES", 250)
+        patch.setattr("viewer.autorig.alignment.pose_fit._ROUNDS", 16)
+        patch.setattr("viewer.autorig.alignment.pose_fit._NEARING", 10)
         settings = AlignmentSettings(samples=125)
         return align_posed(figure, rest_pose(figure.skeleton), robot(), settings, fits=True)
 
