@@ -48,6 +48,27 @@ def test_body_that_skates_is_a_warning_however_slowly(speed, sways):
     assert serious(moved({0: skate + sway, 3: -sway, 6: -sway})) == ["C007"]
 
 
+def pace(start: int) -> np.ndarray:
+    """Return the path of a foot that walks in place: 12 frames back at 1.5 m/s, 8 ahead, lifted."""
+    frame = (_K + start) % 20
+    swing = np.clip((frame - 12) / 8.0, 0.0, 1.0)
+    ahead = np.where(frame < 12, 0.3 - 0.05 * frame, -0.3 + 0.6 * swing)
+    return np.stack([0 * ahead, 0.15 * np.sin(np.pi * swing), ahead], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("aside", "codes"),
+    [
+        (0.0 * _K, []),
+        (0.4 * _K / RATE, ["C007"]),  # the ground seems to move aside with the body
+        (0.9 * np.clip((_K - 22) / 15.0, 0.0, 1.0), ["C007"]),  # faster than feet that slide
+    ],
+)
+def test_walk_in_place_that_glides_aside_is_a_warning(aside, codes):
+    found = moved({0: along(0, aside), 3: pace(0), 6: pace(10)})
+    assert serious(found) == codes
+
+
 def test_standing_body_that_shifts_its_weight_does_not_skate():
     shift = along(2, 0.12 * _K / RATE)
     assert moved({0: shift, 3: -shift, 6: -shift}) == []

@@ -280,7 +280,13 @@ def _slipped(
     # Of the motion as it is: on moving ground, all that rests moves alike.
     body = track.positions[:, travelling_joints(track, subject.actor.figure.require_skeleton())[-1]]
     glides = np.all([_moves_with(path.heel, body) for path in track.paths], axis=0)
-    slides = _sliding(speeds / track.body, touches & ~stands, stands, glides, step)
+    carried = np.repeat(glides[:, None], len(feet), axis=1)
+    if ground is not None:
+        # Of a walk in place, the body moves less than half as fast as a foot that swings.
+        across = np.eye(3) - np.diag(axis_vector(subject.up))
+        body_speeds = np.linalg.norm(np.gradient(body @ across, step, axis=0), axis=1)
+        carried |= body_speeds[:, None] > _ALONG * speeds
+    slides = _sliding(speeds / track.body, touches & ~stands, stands, carried, step)
     slides |= _carried_slowly(track, body, speeds, touches & ~stands, axis_vector(subject.up))
     for foot, contacts in enumerate(found):
         for contact in contacts:
@@ -289,7 +295,8 @@ def _slipped(
     # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
-    travels = _drifting(subject, track, feet, speeds / track.body, touches, height)
+    moves = np.zeros(3) if ground is None else ground.velocity
+    travels = _drifting(subject, track, feet, speeds / track.body, touches, height, moves)
     if not (distances > limits.FAR * track.body).any():
         yield from travels
         return
@@ -329,9 +336,18 @@ def _drifts(path: FootPath, contact: Contact, size: float, up: Floats) -> bool:
 
 
 def _drifting(
-    subject: Subject, track: Track, feet: list[int], speeds: Floats, touches: Bools, height: float
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    speeds: Floats,
+    touches: Bools,
+    height: float,
+    ground: Floats,
 ) -> Iterator[Finding]:
-    """Report a body that travels while its feet walk at another speed, or in place."""
+    """Report a body that travels while its feet walk at another speed, or in place.
+
+    ``ground``: (3,), its velocity below a body in place.
+    """
     # A walker travels, and each foot stands for some time; or both feet pass the body on a ground
     # that moves. If the body travels although no foot ever stands, it glides.
     rows = np.flatnonzero(touches.any(axis=1))
@@ -345,7 +361,12 @@ def _drifting(
     distance = float(np.linalg.norm(travel))
     # Faster than any foot that slides, the body runs or flies.
     speed = float(np.quantile(slowest, _RARELY))
-    if distance < _CARRIED * height * track.scale or not limits.FAST < speed < limits.SWINGS:
+    # Ground that moves below a walker moves backwards. If it seems to move along with the body, so
+    # do the feet that stand on it.
+    is_along = float(ground @ travel) * seconds > _ALONG * distance**2
+    if distance < _CARRIED * height * track.scale:
+        return
+    if not is_along and not limits.FAST < speed < limits.SWINGS:
         return
     yield subject.found(
         "C007.travel: the body travels {distance}, but no foot ever stands",
@@ -392,14 +413,14 @@ def _moves_with(foot: Floats, body: Floats, most: float = _WITH_BODY) -> Bools:
 def _sliding(speeds: Floats, low: Bools, stands: Bools, glides: Bools, step: float) -> Bools:
     """Return the frames (F, N) in which low feet slide; ``speeds`` are body sizes per second.
 
-    ``glides``: (F,), where all feet move with the body.
+    ``glides``: (F, N), where feet move with the body.
     """
     # A foot also swings close to the ground, but while another foot stands, and only after speeding
     # up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
     # no other foot stands. Starting and landing feet slide only for short times. A foot that stays
     # low and moves for longer than any swing is dragged.
     # Faster than any foot that slides, a foot swings, unless the whole body moves with it.
-    moves = low & (speeds > limits.FAST) & ((speeds < limits.SWINGS) | glides[:, None])
+    moves = low & (speeds > limits.FAST) & ((speeds < limits.SWINGS) | glides)
     result = np.zeros_like(moves)
     for foot in range(moves.shape[1]):
         is_alone = np.delete(stands, foot, axis=1).sum(axis=1) == 0
