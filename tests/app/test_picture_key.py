@@ -11,6 +11,7 @@ import viewer
 from viewer.app.pace import picture_key
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.annotation import Marks
+from viewer.rigs.captures.cameras import CameraView
 from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.clip_edit import clip_from_pose
 from viewer.rigs.scene import Actor, Scene
@@ -32,19 +33,38 @@ def state(figure):
     return state
 
 
-def another(value):
-    """Return a different value of the same type."""
+OTHERS = {
+    "up": "z",
+    "fixed": CameraView("front", np.eye(3), np.eye(3), np.zeros(3)),
+    "shading": "scalar",
+    "method": "dqs",
+    "scalar_range": (0.0, 1.0),
+    "path_joints": ((0, 0),),
+    "isolines": True,
+    "skeleton_opacity": 0.5,
+}
+"""Values of fields whose other values do not follow from their type."""
+
+
+def another(owner, name):
+    """Return a different valid value of a field."""
+    value, facts = getattr(owner, name), owner.__dataclass_fields__[name].metadata
+    if name in OTHERS:
+        return OTHERS[name]
+    if "choices" in facts:
+        return next(one for one in facts["choices"] if one != value)
     if isinstance(value, bool):
         return not value
     if isinstance(value, int | float):
-        return value + 1
+        most = facts.get("limits", (0.0, np.inf))[1]
+        return value + 1 if value + 1 <= most else value - 0.25
     if isinstance(value, str):
         return f"{value} else"
     return (0, 0, 0) if value != (0, 0, 0) else None
 
 
 def put(owner, name):
-    setattr(owner, name, another(getattr(owner, name)))
+    setattr(owner, name, another(owner, name))
 
 
 CAMERA = {
@@ -73,7 +93,7 @@ KEY_LIGHT = {
 
 def skin_otherwise(state, name):
     how = state.options.skinning
-    state.options.skinning = replace(how, **{name: another(getattr(how, name))})
+    state.options.skinning = replace(how, **{name: another(how, name)})
 
 
 SKINNING = {
