@@ -9,6 +9,7 @@ import random
 import re
 import socket
 import stat
+import sys
 import threading
 import time
 from contextlib import contextmanager, suppress
@@ -633,6 +634,14 @@ def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, m
     with pytest.raises(ViewerError, match="ZeroDivisionError: of nothing"):
         live.time = 1.0
     assert live.selection == ("first",)
+
+
+def test_threads_take_turns_quickly_while_a_window_listens(tmp_path):
+    usual = sys.getswitchinterval()
+    with screen_at(tmp_path / "window.json"):
+        assert sys.getswitchinterval() == pytest.approx(1e-3)
+    assert sys.getswitchinterval() == pytest.approx(usual)
+    assert usual > 1e-3
 
 
 def test_random_bytes_leave_the_server_at_work(screen):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,9 @@ from viewer.rigs.scene import Actor, Scene
 
 _CAMERA = {"azimuth": (-1e9, 1e9), "inclination": (-90.0, 90.0), "distance": (1e-9, 1e12)}
 """Numbers of a camera that programs may set, and their limits."""
+_SWITCH = 1e-3
+"""Seconds after which a thread that computes lets another one run. With the usual 5 ms, each packet
+that arrives during a frame waits so long before it is read."""
 
 
 @dataclass(slots=True)
@@ -44,6 +48,12 @@ class Live:
     """The scene at the end of the last frame."""
     lacks_humanoid: Scene | None = None
     """Scene without a humanoid, about which a message was shown."""
+    usual_switch: float = field(default_factory=sys.getswitchinterval, init=False)
+    """What ``_SWITCH`` replaces until ``close``."""
+
+    def __post_init__(self) -> None:
+        if self.server is not None:
+            sys.setswitchinterval(min(_SWITCH, self.usual_switch))
 
     @property
     def has_news(self) -> bool:
@@ -76,6 +86,7 @@ class Live:
 
     def close(self) -> None:
         """End all connections."""
+        sys.setswitchinterval(self.usual_switch)
         for part in (self.server, self.vmc_in, self.vmc_out):
             if part is not None:
                 part.close()
