@@ -351,14 +351,13 @@ def _posture(
     usual, own = (top - shoulder for _, top, shoulder in rises)
     if own > _NECK * usual:
         return tuple(found)  # people may raise their arms
-    # A rabbit that is rigged well has -0.1 with outstretched arms; one with its ears for arms has
-    # 0.2 to 0.3.
+    # People with outstretched arms have about 0; a rabbit with its ears for arms has 0.2 to 0.3.
     raised = Finding(
-        "R017.head: the middle of the arms is {value:.0%} of the trunk's length above the head: "
-        "they may be ears",
-        rises[1][0] - rises[1][1],
-        wrong=0.1,
-        good=-0.1,
+        "R017.head: the middle of the arms is {value:.0%} of the trunk's length above head and "
+        "shoulders: they may be ears",
+        rises[1][0] - max(rises[1][1:]),
+        wrong=0.2,
+        good=0.0,
     )
     return (*found, raised)
 
