@@ -319,6 +319,16 @@ def test_legs_of_a_table_are_pairs_around_its_middle(monkeypatch):
     assert not [line for line in table.lines if "far from the skeleton" in str(line)]
 
 
+def test_foot_has_the_root_in_its_middle_and_no_limb_at_its_rim():
+    foot = pipe([(0, 0.1, 0), (0, 0.3, 0)], 0.6, around=24)
+    flat = np.clip(foot[0][:, 1], 0.1, 0.3)  # without the points at both ends
+    foot = np.stack([foot[0][:, 0], flat, foot[0][:, 2]], axis=1), foot[1]
+    lamp = found(united(foot, pipe([(0, 0.2, 0), (0, 1.4, 0), (0.8, 2.0, 0)], 0.06)))
+    joints = joints_of(lamp.figure.skeleton)
+    assert_allclose(joints["root"], [0.0, 0.2, 0.0], atol=0.1)
+    assert "1 limb," in str(lamp.lines[0])
+
+
 def test_corners_of_a_cut_are_no_limbs():
     near = SimpleNamespace(
         _widths=np.array([0.1, 0.1]), _least=0.05, cuts=np.array([[1.0, 0, 0]]),

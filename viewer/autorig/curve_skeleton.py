@@ -85,9 +85,8 @@ _NARROWER = 0.8  # radius of a limb relative to that of the hub, below which it 
 # What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
 # to the solid's, and the ratio of the foot's radius to theirs.
 _FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
-_BODY = (
-    2.0  # radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake
-)
+# Radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake.
+_BODY = 2.0
 
 # Joints along limbs.
 _TOLERANCE = 0.5  # of the polyline, relative to the half width
@@ -234,7 +233,11 @@ class _Field:
         # to the tip of a limb that met no other, they are narrower.
         half = 0.5 * float(self.distances[route[0]])
         there = route[int(np.abs(self.distances[route] - half).argmin())]
-        return bool(self.tips.stood_out[tip] or self.widths(there) < half)
+        if self.widths(there) < half:
+            return True
+        # That may be inside of the trunk. The rim around a foot met the arm on it before.
+        parted = max((at for at, those in self.tips.meetings if tip in those), default=0.0)
+        return bool(self.tips.stood_out[tip]) and parted > half
 
     @property
     def levels(self) -> Ints:
@@ -442,7 +445,12 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
         and (relative[others] >= _STANDS).all()
         and (wide[foot] >= _STEADY * wide[others]).all()
     ):
-        return inside[foot]
+        top = low + 2.0 * float(wide[foot])
+        if top > 0.5 * (low + high):  # a snake
+            return inside[foot]
+        # The way from a tip enters a foot at its rim. Nothing else is as low.
+        is_foot = heights <= top
+        return _deepest_near(solid, solid.centers(solid.voxels[is_foot]).mean(axis=0))
     if len(inwards) == 2:
         between = sum(chain.start == 0 for chain in tree.chains) == 2
         thickest = max(chain.half_width for chain in tree.chains)
