@@ -636,6 +636,21 @@ def test_failure_of_an_action_is_answered_and_the_window_goes_on(screen, live, m
     assert live.selection == ("first",)
 
 
+def test_springs_that_do_not_swing_in_the_window_are_named(live, capsys):
+    class Swings:
+        def swing(self, actor, time):
+            pass
+
+    actor = viewer.animate(bar("braid"), np.zeros((2, 2, 3)))
+    live.add(actor)
+    assert capsys.readouterr().err == ""
+    live.remove(actor)
+    actor.springs = Swings()
+    live.add(actor)
+    note = "viewer: motion: its spring joints do not swing in the window\n"
+    assert capsys.readouterr().err == note
+
+
 def test_threads_take_turns_quickly_while_a_window_listens(tmp_path):
     usual = sys.getswitchinterval()
     with screen_at(tmp_path / "window.json"):

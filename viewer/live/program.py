@@ -538,6 +538,9 @@ def _needs_files(actor: Actor) -> bool:
 
 def _sendable(actor: Actor) -> Actor:
     """Return an actor as it is sent; shapes that need the files of a model are applied to it."""
+    if actor.springs is not None and actor.clip is not None:
+        name = printable(actor.name, 60)
+        sys.stderr.write(f"viewer: {name}: its spring joints do not swing in the window\n")
     pose = actor.own_pose
     if pose is None or not _needs_files(actor):
         return actor
