@@ -214,6 +214,20 @@ def test_sound_motion_has_no_finding(change, is_captured):
     assert linted(change, is_captured) == []
 
 
+@pytest.mark.parametrize(("bend", "codes"), [(30.0, []), (-30.0, ["C024.hinge"])])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_knee_of_a_leg_that_is_straight_otherwise_bends_away_from_the_toes(bend, codes, side):
+    """A leg along -y, whose toes point along z or -z, bends about x for ten frames."""
+    names = ("pelvis", "left_hip", "left_knee", "left_ankle", "left_foot")
+    offsets = [[0, 1, 0], [0.1, 0, 0], [0, -0.45, 0], [0, -0.45, 0], [0, 0, side * 0.15]]
+    figure = Figure("leg", skeleton=make_skeleton(names, [-1, 0, 1, 2, 3], offsets), unit="m")
+    half = 0.5 * np.radians(side * np.where((K >= 20) & (K < 30), bend, 0.0))
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 5, 1))
+    turns[:, 2, 0], turns[:, 2, 3] = np.sin(half), np.cos(half)
+    actor = Actor(figure, clip=SampledClip("x", Timing(RATE, K), turns))
+    assert [one.diagnostic.key for one in hinges.check(Subject(actor))] == codes
+
+
 @pytest.mark.parametrize("gap", [1, 15])
 def test_quick_swing_around_missing_frames_is_not_jitter(gap):
     """4.1 swings a second of up to 40 degrees, around another bend after the gap than before."""

@@ -60,8 +60,8 @@ def pace(start: int) -> np.ndarray:
     ("aside", "codes"),
     [
         (0.0 * _K, []),
-        (0.4 * _K / RATE, ["C007"]),  # the ground seems to move aside with the body
-        (0.9 * np.clip((_K - 22) / 15.0, 0.0, 1.0), ["C007"]),  # faster than feet that slide
+        (0.3 * _K / RATE, ["C007"]),  # the ground seems to move aside with the body
+        (1.4 * np.clip((_K - 22) / 15.0, 0.0, 1.0), ["C007"]),
     ],
 )
 def test_walk_in_place_that_glides_aside_is_a_warning(aside, codes):

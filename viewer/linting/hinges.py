@@ -32,27 +32,40 @@ def check(subject: Subject) -> Iterator[Finding]:
     names = joint_meanings(skeleton)
     for limb in LIMBS:
         if all(name in names for name in limb):
-            upper, hinge, lower = (names.index(name) for name in limb)
-            yield from _hinge(subject, track, skeleton, upper, hinge, lower)
+            joints = [names.index(name) for name in limb]
+            # A leg that hardly bends otherwise bends away from the toes.
+            toe = limb[2].replace("_ankle", "_foot")
+            joints += [names.index(toe)] if toe != limb[2] and toe in names else []
+            yield from _hinge(subject, track, skeleton, joints)
 
 
 def _hinge(
-    subject: Subject, track: Track, skeleton: Skeleton, upper: int, hinge: int, lower: int
+    subject: Subject, track: Track, skeleton: Skeleton, joints: list[int]
 ) -> Iterator[Finding]:
+    """Check a limb: its upper part, hinge and lower part, and the ball of the foot if known."""
     rows = np.flatnonzero(track.present)
-    places = track.positions[rows]
+    if len(rows) == 0:
+        return
+    places, (upper, hinge, lower) = track.positions[rows], joints[:3]
     thigh = unit(places[:, hinge] - places[:, upper])
     shin = unit(places[:, lower] - places[:, hinge])
     # The space of the upper part, in axes of the figure: only its changes matter.
     turns = world_turns(track.rotations[rows], skeleton, upper)
-    across = np.cross(thigh, shin) @ subject.actor.placement[:3, :3]
-    axes = np.einsum("fba,fb->fa", quaternion_to_matrix(turns), across / (track.scale or 1.0))
+    to_figure = subject.actor.placement[:3, :3] / (track.scale or 1.0)
+    spaces = quaternion_to_matrix(turns)
+    axes = np.einsum("fba,fb->fa", spaces, np.cross(thigh, shin) @ to_figure)
     lengths = np.linalg.norm(axes, axis=1)
     bends = np.arctan2(lengths, np.einsum("fa,fa->f", thigh, shin))
     usual = unit(np.median(axes, axis=0))
     sides = np.einsum("fa,a->f", axes, usual)
-    if len(rows) == 0 or np.quantile(np.where(sides > 0.0, bends, 0.0), _LARGER) < _USUAL:
-        return
+    if np.quantile(np.where(sides > 0.0, bends, 0.0), _LARGER) < _USUAL:
+        if len(joints) < 4:
+            return
+        # The shin of a bent knee is behind, where the toes do not point: with the thigh down and
+        # the toes ahead, thigh x shin points as toes x thigh does.
+        toes = unit(places[:, joints[3]] - places[:, lower])
+        ahead = np.einsum("fba,fb->fa", spaces, np.cross(toes, thigh) @ to_figure)
+        sides = np.einsum("fa,a->f", axes, unit(np.median(ahead, axis=0)))
     wrong = np.flatnonzero((sides < _OPPOSITE * lengths) & (bends > _WRONG))
     if len(wrong) == 0 or len(wrong) > _RARELY * len(rows):
         return
