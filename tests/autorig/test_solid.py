@@ -40,6 +40,13 @@ def test_box_has_its_volume_and_distances_also_inside_out(triangles):
     np.testing.assert_allclose(solid.centers(middle), [2.0, 2.5, 3.5], atol=0.026)
 
 
+def test_box_with_some_triangles_inside_out_is_solid():
+    positions, corners = box([1.0, 2, 3], [3, 3, 4])
+    corners[:6] = corners[:6, ::-1]  # half of each side
+    solid = solid_of(positions, corners, resolution=40)
+    assert volume(solid) == pytest.approx(2.0, rel=1e-6)
+
+
 def test_box_with_triangles_for_both_sides_is_solid():
     positions, corners = box([1.0, 2, 3], [3, 3, 4])
     solid = solid_of(positions, np.concatenate([corners, corners[:, ::-1]]), resolution=40)

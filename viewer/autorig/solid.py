@@ -19,7 +19,7 @@ from viewer.errors import RigError
 from viewer.progress import report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.samples import sample_surface
-from viewer.rigs.geometry.topology import part_volumes
+from viewer.rigs.geometry.topology import edges_of, orientations, part_volumes
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -174,11 +174,13 @@ def solid_within(
 
 
 def _outward(positions: Floats, triangles: Ints) -> Floats:
-    """Return one-sided triangles (T, 3, 3), with parts that are inside out reversed."""
+    """Return one-sided triangles (T, 3, 3), flipped ones and parts inside out reversed."""
     mesh = one_sided(weld(positions, triangles))
     if len(mesh.triangles) == 0:
         raise RigError("expected a mesh with an area, found none")
     corners = mesh.positions[mesh.triangles]
+    flipped = orientations(len(corners), edges_of(mesh.triangles))[1]
+    corners[flipped] = corners[flipped][:, ::-1]
     parts = mesh.islands[mesh.triangles[:, 0]]
     volumes = part_volumes(corners, parts, mesh.n_islands)[0]
     against = volumes[parts] < 0.0
