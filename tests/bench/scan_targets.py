@@ -290,7 +290,7 @@ def main() -> None:
         actor = Actor(figure, viewer.rest_pose(figure.skeleton), clip=walk(figure, what))
         path = folder / f"walk_{what}.bvh"
         lines = export_frames(sample_animation(actor), path, "bvh", ExportOptions())
-        print("\n".join(lines))
+        print("\n".join(map(str, lines)))
 
 
 if __name__ == "__main__":
