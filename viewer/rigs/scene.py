@@ -58,7 +58,7 @@ _OUTLIER_RATIO = 100.0
 
 
 class Swinging(Protocol):
-    """Simulation of spring joints; see ``viewer.rigs.motion.spring_motion``."""
+    """Simulation of spring joints; see ``viewer.rigs.springs.simulation``."""
 
     def swing(self, actor: Actor, time: float) -> None:
         """Rotate the spring joints of an actor, already posed by its clip at a time, in place."""
