@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -41,7 +42,10 @@ SET = [
     ("actor", "opacity", np.nan, "opacity: expected a finite number, found nan"),
     ("actor", "opacity", True, "opacity: expected a number, found bool"),
     ("actor", "color", "red", "color: expected 3 numbers or None, found str"),
-    ("actor", "color", (1, 0), "color: expected 3 numbers or None, found tuple"),
+    ("actor", "color", (1, 0), "color: expected 3 numbers or None, found tuple of 2"),
+    ("actor", "color", np.eye(3), "color: expected 3 numbers or None, found ndarray of 3 x 3"),
+    ("actor", "opacity", 10**400, "opacity: expected a number up to 1.8e+308"),
+    ("actor", "opacity", Fraction(10**400), "opacity: expected a number up to 1.8e+308"),
     ("actor", "color", (1, 0, "x"), "color[2]: expected a number, found str"),
     ("actor", "person", "one", "person: expected an integer or None, found str"),
     ("actor", "called", 3, "called: expected a text, found int"),
@@ -56,10 +60,13 @@ SET = [
     ("skinning", "method", 3, 'method: expected "lbs" or "dqs" or "mix", found int'),
     ("skinning", "blend_factor", 2, "blend_factor: expected 0 to 1, found 2"),
     ("skinning", "max_influences", -1, "max_influences: expected 0 or more, found -1"),
+    ("skinning", "max_influences", -(10**400), "max_influences: expected 0 or more, found -1.7"),
     ("skinning", "max_influences", 2.5, "max_influences: expected an integer, found float"),
     ("skinning", "normalize", [1], "normalize: expected True or False, found list"),
     ("options", "skinning", "dqs", "skinning: expected Skinning, found str"),
-    ("options", "path_joints", [(1,)], "path_joints[0]: expected 2 integers, found tuple"),
+    ("options", "path_joints", [(1,)], "path_joints[0]: expected 2 integers, found tuple of 1"),
+    ("options", "path_joints", 3, "path_joints: expected a sequence of tuples of 2 integers"),
+    ("options", "path_joints", np.eye(2), "path_joints[0][0]: expected an integer, found float64"),
     ("light", "color", "red", "color: expected 3 numbers, found str"),
     ("camera", "distance", None, "distance: expected a number, found NoneType"),
     ("camera", "target", [1, 2], "target: expected shape 3, found 2"),
@@ -110,6 +117,7 @@ def test_what_numpy_users_write_is_converted():
     assert actor.visible is False and type(actor.opacity) is float
     actor.placement = [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]
     assert actor.vertices()[0].max() == 2.0
+    assert viewer.DisplayOptions(path_joints=np.array([[0, 1]])).path_joints == ((0, 1),)
     assert viewer.Mesh(*FACE[:1], FACE[0], [[0, 1, 2]], materials=[]).materials == ()
 
 

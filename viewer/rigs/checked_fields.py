@@ -107,9 +107,18 @@ class _Kind(NamedTuple):
     def read(self, name: str, value: Any) -> object:
         """Return what is kept of a value; ``RigError`` if it does not fit."""
         if not self.fits(value):
-            found = type(value).__name__
-            raise RigError(f"{name}: expected {self.text}, found {found}")
+            raise RigError(f"{name}: expected {self.text}, found {_found(value)}")
         return self.convert(name, value)
+
+
+def _found(value: object) -> str:
+    """Return what an error says about a value of another type or length."""
+    size: object = ""
+    if isinstance(value, np.ndarray):
+        size = " x ".join(map(str, value.shape))
+    elif isinstance(value, Sequence) and not _is_text(value):
+        size = len(value)
+    return type(value).__name__ + (f" of {size}" if size != "" else "")
 
 
 def _rule(cls: type, field: Field[Any]) -> _Rule | None:
@@ -132,7 +141,8 @@ def _rule(cls: type, field: Field[Any]) -> _Rule | None:
     def read(name: str, value: Any) -> object:
         found: Any = kind.read(name, value)
         if found is not None and not low <= found <= high:
-            raise RigError(f"{name}: expected {wanted}, found {found:g}")
+            shown = min(max(found, -sys.float_info.max), sys.float_info.max)  # of huge integers
+            raise RigError(f"{name}: expected {wanted}, found {shown:g}")
         return found
 
     return _Rule(frozenset(), read)
@@ -224,18 +234,23 @@ def _sequence(
     """Return the kind of a tuple, list or set with any number of elements of a kind."""
 
     def convert(name: str, value: Any) -> object:
-        if not value and type(value) is made:
+        if type(value) is made and not value:
             return value
         found = [item.read(f"{name}[{place}]", each) for place, each in enumerate(value)]
         is_same = type(value) is made and all(map(operator.is_, found, value))
         return value if is_same else made(found)
 
     is_set = made is frozenset
-    return _Kind(
-        f"{'a set' if is_set else 'a sequence'} of {_PLURALS.get(item.text, item.text)}",
-        lambda value: isinstance(value, Set if is_set else Sequence) and not _is_text(value),
-        convert,
-    )
+    elements = _PLURALS.get(item.text, item.text)
+    if elements[0].isdigit():
+        elements = f"tuples of {elements}"
+
+    def fits(value: object) -> bool:
+        if isinstance(value, np.ndarray):
+            return value.ndim > 0 and not is_set
+        return isinstance(value, Set if is_set else Sequence) and not _is_text(value)
+
+    return _Kind(f"{'a set' if is_set else 'a sequence'} of {elements}", fits, convert)
 
 
 def _fixed(items: Sequence[_Kind]) -> _Kind:
@@ -282,8 +297,12 @@ def _is_finite(values: Floats) -> bool:
 
 
 def _number(name: str, value: Any) -> object:
-    number = value if type(value) in (float, int) else float(value)
-    if not math.isfinite(number):
+    try:
+        number = value if type(value) in (float, int) else float(value)
+        is_finite = math.isfinite(number)
+    except OverflowError:  # an integer or a fraction that no float can hold
+        raise RigError(f"{name}: expected a number up to {sys.float_info.max:.2g}") from None
+    if not is_finite:
         raise RigError(f"{name}: expected a finite number, found {number}")
     return number
 
