@@ -274,6 +274,17 @@ def test_bones_of_a_frame_do_not_cross_it(monkeypatch):
             assert min(gaps) <= 2.0 / 24
 
 
+@pytest.mark.parametrize("height", [0.5, 3.0])
+def test_straight_bone_gets_no_joints_even_outside(height):
+    # The path itself is outside at a height of 3: no joint on it brings the bone inside.
+    positions, triangles = box((0, 0, 0), (1, 1, 1))
+    points = np.array([[0.0, height, 0.1], [1.0, height, 0.1]])
+    chain = curve_skeleton.Chain(0, -1, points, 0.05, 0.0, frozenset({0}))
+    solid = solid_of(positions, triangles, 24)
+    lengths = curve_skeleton.bones_inside(chain, np.array([0.3, 1.0]), solid)
+    assert lengths.tolist() == [0.3, 1.0]
+
+
 def test_trunk_between_two_limbs_has_the_root_if_it_is_thicker(monkeypatch):
     half_resolution(monkeypatch)
     ball = pipe([(0, -0.05, 0), (0, 0.05, 0)], 0.6, around=16)

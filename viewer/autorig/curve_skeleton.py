@@ -106,6 +106,7 @@ _HINGE, _RIGID = 3.0, 10.0
 # Least distance of bends, relative to the half width and to the length: a rounded knee is one bend.
 _CLOSEST, _CLOSEST_PART = 3.0, 0.1
 _END = 0.5  # distance of the last joint from the tip, relative to the half width
+_STRAIGHT = 1e-6  # distance from a bone up to which a path is straight, relative to its length
 
 # Symmetry.
 # Fraction of the voxels whose mirror images are inside: without a doubt; and of a figure in an
@@ -550,6 +551,8 @@ def bones_inside(chain: Chain, lengths: Floats, solid: Solid) -> Floats:
         way = at_lengths(chain.points, np.linspace(begin, end, count))
         if not _is_inside(solid, way[0], way[-1]):
             apart = np.linalg.norm(way - _nearest_on(way, way[0], way[-1]), axis=1)
+            if apart.max() <= _STRAIGHT * (end - begin):
+                continue  # the path itself is outside, and another joint would be, too
             middle = begin + (end - begin) * float(apart.argmax()) / (count - 1)
             todo += [(begin, middle), (middle, end)]
             found.pop()
