@@ -156,8 +156,10 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator
     sizes = np.where(rotates[:, None], np.abs(skeleton.dof_limits), 0.0)
     wide = ((sizes > _TURNS[0]) & (sizes <= _TURNS[1])).any(axis=1)
     degrees = np.setdiff1d(np.flatnonzero(wide), _spinning(subject))
-    if not _are_endless(low[degrees], high[degrees]).all():
-        first = int(degrees[0])
+    finite = degrees[~_are_endless(low[degrees], high[degrees])]
+    if len(finite):
+        # If one limit is in degrees, the others are, too; but the one named is no wheel's.
+        first = int(finite[0])
         yield subject.found(
             "S014.limits: {n} limits of more than two turns, which look like degrees (first: "
             "{dof}, {low} to {high})",
