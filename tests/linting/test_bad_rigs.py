@@ -275,11 +275,12 @@ def stuck_out() -> Figure:
     return replace(body(), mesh=replace(mesh, positions=points))
 
 
-def taken(name: str = "left_knee", by: str = "right_knee") -> Figure:
-    """Return the body with all weights of one joint at another."""
+def taken(names: tuple[str, ...] = ("left_knee",), by: str = "right_knee") -> Figure:
+    """Return the body with all weights of some joints at another."""
     weights = table().copy()
-    weights[:, joint(by)] += weights[:, joint(name)]
-    weights[:, joint(name)] = 0.0
+    for name in names:
+        weights[:, joint(by)] += weights[:, joint(name)]
+        weights[:, joint(name)] = 0.0
     return weighted(weights)
 
 
@@ -387,7 +388,7 @@ def test_joints_without_sides_in_their_names_are_compared_by_place():
 
 def test_joint_without_weights_beside_another_limb_is_a_helper():
     """A hand without weights moves with the arm."""
-    assert linted(taken("left_wrist", "left_elbow"), (stray_weights,)) == []
+    assert linted(taken(("left_wrist",), "left_elbow"), (stray_weights,)) == []
 
 
 def test_hands_of_crossed_arms_have_the_right_names():

@@ -115,9 +115,17 @@ def test_stray_weight_goes_to_the_joints_of_its_surroundings(amount):
     assert "weights of 1 vertex" in note
 
 
-def test_taken_weights_go_back():
+@pytest.mark.parametrize(
+    "given",
+    [
+        (("left_knee",), "right_knee"),
+        # The legs are also nearer to the left wrist than to the head.
+        (("left_wrist", "left_knee", "right_knee"), "head"),
+    ],
+)
+def test_taken_weights_go_back(given):
     # Weights below 0.01 are not seen.
-    figure, note = fixed(taken(), stray_weights)
+    figure, note = fixed(taken(*given), stray_weights)
     np.testing.assert_allclose(weights_of(figure), table(), atol=0.01)
     assert "W012 fixed" in note
 

@@ -149,7 +149,7 @@ def _taken(
     found: Support, points: Floats, places: Floats, parents: Ints, distances: Floats, size: float
 ) -> tuple[Taken, ...]:
     """Return what is moved around joints without weights by joints of another limb."""
-    result = []
+    result: list[tuple[int, int, Floats]] = []
     used = np.zeros(len(parents), dtype=np.bool_)
     used[found.joints] = True
     # Controls and helpers are below others without weights.
@@ -163,9 +163,19 @@ def _taken(
             continue
         taker = int(np.bincount(found.joints[rows], found.weights[rows]).argmax())
         if (found.weights[rows[found.joints[rows] == taker]] > _MOSTLY).sum() >= _TAKEN:
-            every = np.flatnonzero((found.joints == taker) & (near < distances))
-            result.append(Taken(joint, taker, every))
-    return tuple(result)
+            result.append((joint, taker, near))
+    nearest: dict[int, Floats] = {}
+    for _, taker, near in result:
+        nearest[taker] = np.minimum(nearest.get(taker, distances), near)
+    # Of several joints, each gets back what is nearest to it.
+    return tuple(
+        Taken(
+            joint,
+            taker,
+            np.flatnonzero((found.joints == taker) & (near < distances) & (near <= nearest[taker])),
+        )
+        for joint, taker, near in result
+    )
 
 
 def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:
