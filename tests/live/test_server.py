@@ -649,6 +649,12 @@ def test_springs_that_do_not_swing_in_the_window_are_named(live, capsys):
     live.add(actor)
     note = "viewer: motion: its spring joints do not swing in the window\n"
     assert capsys.readouterr().err == note
+    # Once, although hiding a part sends the actor again.
+    actor.hidden_parts = frozenset([0])
+    live.update()
+    assert capsys.readouterr().err == ""
+    live.show(viewer.Scene([actor]))
+    assert capsys.readouterr().err == note
 
 
 def test_threads_take_turns_quickly_while_a_window_listens(tmp_path):

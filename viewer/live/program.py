@@ -43,7 +43,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.memo import NumberKey
 from viewer.rigs.pose import Pose
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Motion, Scene
 from viewer.rigs.shape import shaped
 
 _RATE = 60.0  # times per second at which changes are looked for
@@ -66,13 +66,24 @@ class _Look(NamedTuple):
     placement: bytes
 
 
+class _Content(NamedTuple):
+    """A key of what is sent as a whole: the figure and the motion."""
+
+    figure: Figure
+    clip: Motion | None
+    offset: float
+    name: str
+    hidden_parts: frozenset[int]
+    weights: bytes
+
+
 @dataclass(slots=True)
 class _Sent:
     """What the window has of an actor."""
 
     number: int
     """The window's number of the actor."""
-    content: object
+    content: _Content
     look: _Look
     pose: NumberKey
 
@@ -157,6 +168,8 @@ class Live:
             told = {"object": pack(tuple(sent), arrays), "up": scene.up, "time": scene.time}
             told |= {name: pack(each, arrays) for name, each in facts.items() if each is not None}
             numbers = self._ask("scene", told, arrays).facts["numbers"]
+            for actor in scene.actors:
+                _note_springs(actor)
             self.scene, self._time = scene, scene.time
             self._sent = {
                 actor: _Sent(number, _content(actor), _look(actor), _pose_key(actor))
@@ -236,6 +249,8 @@ class Live:
         if known is not None:
             told["actor"] = known.number
         number = self._ask("put", told, arrays).facts["number"]
+        if known is None or known.content.clip is not actor.clip:
+            _note_springs(actor)
         self._sent[actor] = _Sent(number, content, _look(actor), _pose_key(actor))
 
     def _send_changes(self, actor: Actor, sent: _Sent) -> None:
@@ -538,9 +553,6 @@ def _needs_files(actor: Actor) -> bool:
 
 def _sendable(actor: Actor) -> Actor:
     """Return an actor as it is sent; shapes that need the files of a model are applied to it."""
-    if actor.springs is not None and actor.clip is not None:
-        name = printable(actor.name, 60)
-        sys.stderr.write(f"viewer: {name}: its spring joints do not swing in the window\n")
     pose = actor.own_pose
     if pose is None or not _needs_files(actor):
         return actor
@@ -548,15 +560,21 @@ def _sendable(actor: Actor) -> Actor:
     return replace(actor, figure=figure, own_pose=_without_shapes(pose))
 
 
+def _note_springs(actor: Actor) -> None:
+    """Tell the user of a program that the springs of an actor with a motion do not swing."""
+    if actor.springs is not None and actor.clip is not None:
+        name = printable(actor.name, 60)
+        sys.stderr.write(f"viewer: {name}: its spring joints do not swing in the window\n")
+
+
 def _without_shapes(pose: Pose) -> Pose:
     return replace(pose, shape_weights=np.zeros(0))
 
 
-def _content(actor: Actor) -> object:
-    """Return a key of what is sent as a whole: the figure and the motion."""
+def _content(actor: Actor) -> _Content:
     pose = actor.own_pose
     weights = b"" if pose is None or not _needs_files(actor) else pose.shape_weights.tobytes()
-    return actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights
+    return _Content(actor.figure, actor.clip, actor.offset, actor.name, actor.hidden_parts, weights)
 
 
 def _look(actor: Actor) -> _Look:
