@@ -79,6 +79,12 @@ def test_ground_rests_if_only_one_foot_moves():
     assert moving_ground(feet, [(0, COUNT)], RATE, 1.0, Y) is None
 
 
+@pytest.mark.parametrize("spans", [[], [(3, 5)]])
+def test_ground_rests_if_a_motion_has_too_few_frames(spans):
+    foot = steps(np.ones(COUNT), np.ones(COUNT, bool))
+    assert moving_ground([foot, foot], spans, RATE, 1.0, Y) is None
+
+
 HEIGHT = np.array([0.0, 1.0, 0.0, 0.0])
 
 

@@ -255,12 +255,12 @@ def moving_ground(
     is_low = lows < lows.min(axis=0) + limits.LOWEST * size
     for seconds in limits.GROUND_WINDOWS:
         half = half_window(rate, seconds)
-        rows = np.concatenate([np.arange(first + half, last - half) for first, last in spans])
-        rows = rows.astype(np.int32)
+        every = [np.arange(first + half, last - half) for first, last in spans]
+        rows = np.concatenate([np.zeros(0, np.int32), *every]).astype(np.int32)
         if not len(rows):
             return None
-        every = rate * np.stack([_lowest_velocities(foot, rows, half, up) for foot in feet])
-        speeds = every[lows[:, rows].argmin(axis=0), np.arange(len(rows))]
+        moved = rate * np.stack([_lowest_velocities(foot, rows, half, up) for foot in feet])
+        speeds = moved[lows[:, rows].argmin(axis=0), np.arange(len(rows))]
         near = limits.GROUND_SAME * size
         candidates = speeds[:: -(-len(speeds) // _MOST)]
         counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
@@ -278,7 +278,7 @@ def moving_ground(
         is_usual = is_alike.mean() > limits.GROUND_USUAL
         is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
         # People step with both feet, and deliver a blow with one.
-        steps = (np.linalg.norm(every - velocity, axis=2) < most) & is_low[:, rows]
+        steps = (np.linalg.norm(moved - velocity, axis=2) < most) & is_low[:, rows]
         of_other = np.sort(steps.sum(axis=1))[-2:].min()
         is_usual &= of_other > limits.GROUND_OTHER_FOOT * is_alike.sum()
         if is_moving and is_usual:
