@@ -59,16 +59,17 @@ def steps(speeds: np.ndarray, is_down: np.ndarray) -> FootPath:
     return FootPath(path, path, np.tile(0.5 * Y, (len(path), 1)))
 
 
-def test_ground_of_a_cycle_is_found_although_feet_move_unevenly():
+@pytest.mark.parametrize(("power", "error"), [(1.3, 0.1), (1.0, 0.25)])
+def test_ground_of_a_cycle_is_found_although_feet_move_unevenly(power, error):
     # Two feet alternate; they begin a step at 1.4 and end it at 0.6 body sizes per second, and move
-    # at 0.9 to 1.1 for a third of it.
+    # at 0.9 to 1.1 for a third or, with constant deceleration, a quarter of it.
     phase = np.arange(120) % 30 / 30.0
     x = 4.0 * phase - 1.0
-    speeds = np.where(phase < 0.5, -1.0 + 0.4 * np.sign(x) * np.abs(x) ** 1.3, 1.0)
+    speeds = np.where(phase < 0.5, -1.0 + 0.4 * np.sign(x) * np.abs(x) ** power, 1.0)
     other = np.roll(speeds, 15)
     feet = [steps(speeds, phase < 0.5), steps(other, np.roll(phase < 0.5, 15))]
     found = moving_ground(feet, [(0, 120)], RATE, 1.0, Y)
-    assert_allclose(found.velocity, -1.0 * Z, atol=0.1)
+    assert_allclose(found.velocity, -1.0 * Z, atol=error)
     assert 1.0 < found.slips <= 2.0
 
 
