@@ -252,7 +252,7 @@ def _shapes(lod: Archive, n_vertices: int) -> BlendShapes | None:
 def _correctives(
     source: Source, rig: Archive, lod: Archive, n_joints: int, n_vertices: int
 ) -> Correctives | None:
-    """Return the correctives; their offsets stay in single precision, to save memory."""
+    """Return the correctives; their offsets are read on first use, and zeros are not stored."""
     if not (lod.has("corrective_blendshapes") and rig.has("0.sparse_indices")):
         source.warn("F007.mhr-correctives: no pose correctives: plain linear blend skinning")
         return None

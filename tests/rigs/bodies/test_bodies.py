@@ -164,9 +164,10 @@ def test_rest_pose_reads_no_data():
     assert not correctives.displacement(np.zeros(ROWS)).any() and loads == []
 
 
-def test_arrays_of_zeros_have_no_offsets():
-    offsets = sparse(np.zeros((ROWS, VERTICES, 3), np.float32), [])
-    assert_array_equal(offsets.total(np.ones(ROWS)), np.zeros((VERTICES, 3)))
+@pytest.mark.parametrize("count", [ROWS, 0])
+def test_arrays_of_zeros_have_no_offsets(count):
+    offsets = sparse(np.zeros((count, VERTICES, 3), np.float32), [])
+    assert_array_equal(offsets.total(np.ones(count)), np.zeros((VERTICES, 3)))
     assert not offsets.of_vertices(np.arange(3)).any()
 
 

@@ -65,8 +65,8 @@ class SparseOffsets(Deferred):
 
         width, count = 3 * self.shape[1], 0
         starts = [np.zeros(1, np.intp)]
-        columns: list[Ints] = []
-        values: list[Floats] = []
+        columns = [np.zeros(0, np.int32)]
+        values = [np.zeros(0)]
         for block in self._blocks():
             flat = block.reshape(-1)
             places = np.flatnonzero(flat != 0.0)  # much faster than for floats
