@@ -78,11 +78,11 @@ bench: $(READY) system
 golden: $(READY) system
 	@VIEWER_UPDATE_GOLDEN="$(or $(PICTURES),all)" $(TESTING) -q tests/rendering tests/app
 
-# Regenerates the reference tables of the manual from the registries.
 # Executes the notebooks of viewer/examples, and stores them with their outputs.
 notebooks: $(READY)
 	@$(BIN)/python tests/notebooks.py $(NAMES)
 
+# Regenerates the reference tables of the manual from the registries.
 manual: $(READY)
 	@$(BIN)/python tests/manual/reference.py
 

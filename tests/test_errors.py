@@ -62,3 +62,16 @@ def test_printable_truncates_long_text():
 def test_names_in_messages_stay_on_one_line(kind):
     assert str(kind("joint a\nb\x1b: x")) == "joint a\\nb\\x1b: x"
     assert len(str(kind("x" * 5000))) == 1000
+
+
+@pytest.mark.parametrize(
+    ("problem", "reason"),
+    [
+        (OSError(28, "No space left on device", "a.glb"), "No space left on device"),
+        (ValueError("embedded null byte"), "embedded null byte"),
+        (OSError("not\nopen"), "not\\nopen"),
+        (TimeoutError(), "TimeoutError"),
+    ],
+)
+def test_files_that_cannot_be_written_have_a_reason(problem, reason):
+    assert str(OutputError.at("dir/a.glb", problem)) == f"dir/a.glb: {reason}"

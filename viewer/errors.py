@@ -35,8 +35,8 @@ _LONGEST = 1000  # maximum length of a message that contains names, characters
 
 
 def reason_of(problem: Exception) -> str:
-    """Return why a file could not be read or written, in the words of the system if there are."""
-    return printable(getattr(problem, "strerror", None) or problem)
+    """Return why a file could not be read or written: the system's words, if it gave any."""
+    return printable(getattr(problem, "strerror", None) or str(problem) or type(problem).__name__)
 
 
 class ViewerError(Exception):

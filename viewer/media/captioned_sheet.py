@@ -5,29 +5,26 @@ Pillow is imported on first use.
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.errors import FormatError, ViewerError
+from viewer.media.image import decode_picture, is_picture
 from viewer.media.picture_sinks import sheet_layout
+from viewer.media.video_kinds import VIDEOS
+from viewer.media.video_reading import VideoFrames
 from viewer.rigs.arrays import Bytes
 
 if TYPE_CHECKING:
     from PIL import ImageDraw, ImageFont
 
     Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
-
-
-import base64
-import io
-from pathlib import Path
-
-from viewer.errors import FormatError, ViewerError
-from viewer.media.image import decode_picture, is_picture
-from viewer.media.video_kinds import VIDEOS
-from viewer.media.video_reading import VideoFrames
 
 _WIDTH = 240  # width of a cell, pixels
 _HEIGHTS = 120, 320  # minimum and maximum height of a cell's picture

@@ -26,7 +26,7 @@ class Figure {
   // The matrix from the figure's space to the scene's.
   get placement() { return product4(placed(this.shift), this.data.placement); }
 
-  // The mean of the joints, or the centre of a figure without joints, in scene space; see follow.py.
+  // The mean of the joints, or the centre of a figure without joints, in scene space; see recorder.py.
   get place() {
     const places = this.data.joints ? this.tracks.joints() : this.center, n = places.length / 3;
     const [x, y, z] = [0, 1, 2].map((i) => {

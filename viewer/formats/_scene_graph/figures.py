@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,7 +13,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.bindings import bind_rigid, bind_skins, inverse_binds
-from viewer.formats._scene_graph.content import REACH, NodeFile
+from viewer.formats._scene_graph.content import REACH, NodeCamera, NodeFile, NodeTree
 from viewer.formats._scene_graph.grouping import Members, group_nodes, is_skinned, scene_order
 from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
 from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
@@ -26,22 +28,14 @@ from viewer.formats._scene_graph.surfaces import (
 )
 from viewer.phrases import Remedy, agree, counted, listed, quoted, rounded
 from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
 from viewer.rigs.figure import Figure, FigureGroup, read_from
 from viewer.rigs.file_record import FileRecord, VrmRecord
-from viewer.rigs.hierarchy import with_ancestors
+from viewer.rigs.hierarchy import path_to_root, with_ancestors
 from viewer.rigs.motion.transform_clip import Animation
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source
-
-
-import math
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
-
-from viewer.formats._scene_graph.content import NodeCamera, NodeTree
-from viewer.rigs.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
-from viewer.rigs.hierarchy import path_to_root
 
 _MOST_VERTICES = 1 << 27  # of all parts of all figures
 _LONGEST = 200  # maximum number of characters of a fact

@@ -239,7 +239,7 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
-_FASTEST = 2000.0  # frames per second of the fastest cameras of motion capture
+_FASTEST_CAMERA = 2000.0  # frames per second of motion capture
 _LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
 _DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
@@ -288,7 +288,7 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
         )
         return rate
     rate = _nearest_rate(frame_time, 1.0 / seconds)
-    if rate > _FASTEST:
+    if rate > _FASTEST_CAMERA:
         source.warn(
             "C017.bvh-fast: Frame Time: {found} seconds are {rate:,.0f} fps, more than cameras of "
             "motion capture have ({remedy} overrides it)",

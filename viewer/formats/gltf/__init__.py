@@ -16,20 +16,25 @@ Specification: Khronos Group, glTF 2.0, ISO/IEC 12113.
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from viewer.diagnostics import Phrase
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._source import Source
+from viewer.formats._vrm.parts import objects_in
 from viewer.formats._vrm.reading import with_vrm
 from viewer.formats.gltf.animations import Targets, read_animations
 from viewer.formats.gltf.checks import check_document
 from viewer.formats.gltf.document import Document, open_document
-from viewer.formats.gltf.materials import DEFAULT_MATERIAL, reading_materials
+from viewer.formats.gltf.materials import DEFAULT_MATERIAL, DRAWN_EXTENSIONS, reading_materials
 from viewer.formats.gltf.meshes import node_weights, read_meshes
 from viewer.formats.gltf.nodes import (
     checked_bindings,
@@ -40,23 +45,13 @@ from viewer.formats.gltf.nodes import (
     shown_scene,
 )
 from viewer.formats.gltf.toon import stored_textures, stored_toon
+from viewer.phrases import agree, counted, listed
 from viewer.rigs.figure import FigureGroup
+from viewer.rigs.file_record import Json
+from viewer.rigs.hierarchy import descendants
 
 if TYPE_CHECKING:
     from viewer.rigs.motion.skeleton_motion import SkeletonMotion
-
-
-import re
-from collections import Counter
-from collections.abc import Iterator
-from typing import Any
-
-from viewer.diagnostics import Phrase
-from viewer.formats._vrm.parts import objects_in
-from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
-from viewer.phrases import agree, counted, listed
-from viewer.rigs.file_record import Json
-from viewer.rigs.hierarchy import descendants
 
 _VRM = {"VRM", "VRMC_vrm"}
 _MOTION = "VRMC_vrm_animation"
