@@ -606,23 +606,24 @@ def test_crowds_see_every_change_of_a_scene_that_was_still(change, n_frames):
         assert one.colors == [actor.color for actor in shown]
 
 
-def test_crowds_see_what_changed_in_a_frame_that_failed():
+def test_crowds_see_what_changed_in_a_frame_that_failed(monkeypatch):
+    def no_memory(*_):
+        raise MemoryError
+
     scene, options, drawn = crowd(12, **COARSE), DisplayOptions(), lineup.Lineup()
     drawn = lineup.lineup(scene.actors, options, drawn)
     scene.actors[2].pose.figure_translation[0] = 5.0
-    scene.actors[3].placement, known = np.eye(3), scene.actors[3].placement
-    with pytest.raises(ValueError, match="must match"):
+    with monkeypatch.context() as broken, pytest.raises(MemoryError):
+        broken.setattr(lineup.Crowd, "_place", no_memory)  # after poses were compared
         lineup.lineup(scene.actors, options, drawn)
-    scene.actors[3].placement = known
     drawn = lineup.lineup(scene.actors, options, drawn)
     (one,) = drawn.crowds.values()
     models = [actor.placement @ placement_matrix(actor.pose) for actor in scene.actors]
     assert np.array_equal(one.models, models)
     scene.actors[4].placement[0, 3] = 7.0
-    scene.actors[5].pose.figure_scale, known = "large", scene.actors[5].pose.figure_scale
-    with pytest.raises(TypeError):
+    with monkeypatch.context() as broken, pytest.raises(MemoryError):
+        broken.setattr(lineup, "placements", no_memory)  # after placements were compared
         lineup.lineup(scene.actors, options, drawn)
-    scene.actors[5].pose.figure_scale = known
     lineup.lineup(scene.actors, options, drawn)
     models = [actor.placement @ placement_matrix(actor.pose) for actor in scene.actors]
     assert np.array_equal(one.models, models)
