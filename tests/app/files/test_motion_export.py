@@ -29,8 +29,9 @@ from viewer.formats import save_bytes
 from viewer.media.saving import save_text
 from viewer.progress import report
 from viewer.rigs.geometry.transform import translation_matrix
+from viewer.rigs.mesh import bounding_box
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor, Scene, scene_points
 
 
 @pytest.fixture
@@ -456,6 +457,38 @@ def test_still_figures_are_exported_together(drive, rig, tmp_path, suffix):
         assert '"wipes":true' in page and len(re.findall('"name":"tiny"', page)) >= 2
     else:
         assert len(viewer.load(path)) == (2 if suffix == ".glb" else 1)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_figures_in_one_file_keep_their_unit(drive, rig, tmp_path, moves):
+    """Figures in centimetres, 2 m apart, are in metres in glTF."""
+    first, second = viewer.load(*rig)[0], viewer.load(*rig)[0]
+    first.figure = second.figure = replace(first.figure, unit="cm")
+    second.placement[0, 3] = 200.0
+    for actor in (first, second):
+        actor.clip = viewer.animate(actor.figure, np.zeros((2, 2, 3))).clip if moves else None
+    hand = drive(scene=Scene([first, second]), size=(1000, 700), samples=1)
+    size = np.ptp(bounding_box(scene_points(Scene([first]))), axis=0)  # posed by the window
+    if moves:
+        save_motion(hand.state, tmp_path / "a.glb", everyone=True)
+    else:
+        save_export(hand.state, tmp_path / "a.glb", everyone=True)
+    hand.finish_job()
+    assert hand.state.error == ""
+    written = viewer.load(tmp_path / "a.glb")
+    boxes = [bounding_box(scene_points(Scene([actor]))) for actor in written]
+    for box in boxes:
+        assert np.allclose(np.ptp(box, axis=0), 0.01 * size, rtol=1e-4)
+    assert np.allclose(boxes[1] - boxes[0], [2.0, 0.0, 0.0], atol=1e-4)
+
+
+def test_captured_points_are_not_among_the_exported_poses(drive, rig, tmp_path):
+    bodies = [viewer.load(*rig)[0] for _ in range(2)]
+    hand = drive(scene=Scene([*bodies, dots(1.0)]), size=(1000, 700), samples=1)
+    save_export(hand.state, tmp_path / "a.glb", everyone=True)
+    hand.finish_job()
+    assert hand.state.error == "" and len(viewer.load(tmp_path / "a.glb")) == 2
+    assert hand.says("captured points are not exported: face4 0")
 
 
 @pytest.fixture

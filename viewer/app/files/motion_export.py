@@ -201,6 +201,16 @@ def is_one_file(path: Path) -> bool:
     return any(is_together(kind, path, ExportOptions()) for kind in kinds)
 
 
+def figures(scene: Scene) -> list[Actor]:
+    """Return the actors whose poses are exported together: captured points only if alone."""
+    return [actor for actor in scene.actors if not actor.moves_points] or [*scene.actors]
+
+
+def scene_now(state: AppState) -> Scene:
+    """Return a copy of the scene, which later edits do not change."""
+    return replace(state.scene, actors=[actor.copy() for actor in state.scene.actors])
+
+
 @shows_errors
 def save_motion(
     state: AppState, path: Path, everyone: bool = False, options: ExportOptions | None = None
@@ -222,7 +232,7 @@ def save_motion(
         check_targets(files, state.inputs, force=True)
     else:
         check_folder_target(files[0], state.inputs, force=True)
-    scene = Scene([], world_up=state.scene.up, views=state.scene.views)
+    scene = scene_now(state)
     options = replace(options_for(state, path, options), kind=kind)
     has_still = everyone and "pose" in EXPORTERS[kind].stores and is_one_file(path)
     still = [each for each in state.scene.actors if has_still and each.clip is None]
@@ -284,13 +294,16 @@ def _motions(
         motions.append(_Motion(copied, file, frames, rate, saved))
     if not motions:
         raise RigError("all actors are absent in the playback range: nothing to export")
-    points = [actor for actor in state.scene.actors if actor.moves_points]
-    if everyone and points:
-        names = [actor.name for actor in points]
-        notes.append(
-            note("X003.points: captured points are not exported: {names}", names=all_of(names))
-        )
-    return motions, selected, notes
+    return motions, selected, notes + (points_note(state.scene) if everyone else [])
+
+
+def points_note(scene: Scene) -> list[Diagnostic]:
+    """Return a note about captured points, which are not among all exported actors."""
+    exported = figures(scene)
+    names = [actor.name for actor in scene.actors if actor not in exported]
+    if not names:
+        return []
+    return [note("X003.points: captured points are not exported: {names}", names=all_of(names))]
 
 
 def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:
@@ -373,7 +386,7 @@ def draw_pose_formats(state: AppState, dialog: FileDialog, selection: Chosen) ->
     suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
     if suffix not in formats:
         return
-    count = len(state.scene.actors)
+    count = len(figures(state.scene))
     if count > 1 and is_one_file(Path(f"pose{suffix}")):
         _draw_actors(state, selection, count)
         explain("in their current poses, one file for all")

@@ -17,13 +17,17 @@ from viewer.app.files.motion_export import (
     N_ROWS,
     Chosen,
     draw_pose_formats,
+    figures,
     is_one_file,
     options_for,
+    points_note,
     pose_formats,
+    scene_now,
 )
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.posed_joint import Orientation
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.exporters import ExportOptions, Part, Selection, export, files_written
 from viewer.exporters.pose import export as export_pose
@@ -35,7 +39,7 @@ from viewer.rigs.pose import Pose, pose_key
 from viewer.rigs.posing.pose_record import record_of
 from viewer.rigs.posing.pose_vector import write_vector
 from viewer.rigs.retargeting.mirror import mirror_pose
-from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.scene import Actor
 
 PoseTool: TypeAlias = Literal["select", "rotate", "move"]
 TOOLS: dict[PoseTool, tuple[str, str, str]] = {
@@ -242,7 +246,7 @@ def ask_for_export(state: AppState) -> None:
         suffixes,
         f"{file_stem(state.actor.name)}{suffix}",
         more=lambda state, dialog: draw_pose_formats(state, dialog, chosen),
-        more_rows=N_ROWS + (3.0 if len(state.scene.actors) > 1 else 1.5),
+        more_rows=N_ROWS + (3.0 if len(figures(state.scene)) > 1 else 1.5),
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 
@@ -256,17 +260,22 @@ def save_export(
     Formats that hold several figures may contain ``everyone``, placed as in the scene.
     """
     files, how = files_written(path), options_for(state, path, options)
-    actors = state.scene.actors if everyone and is_one_file(path) else [state.actor]
+    actors, notes = [state.actor], list[Diagnostic]()
     # Edits made during the export must not change the written poses.
-    if len(actors) > 1:
-        scene = Scene([], world_up=state.scene.up)
-        selection: Actor | Selection = Selection([Part(each.copy()) for each in actors], scene)
+    if everyone and is_one_file(path):
+        scene = scene_now(state)
+        actors, notes = figures(state.scene), points_note(scene)
+        selection: Actor | Selection = Selection([*map(Part, figures(scene))], scene)
     else:
         selection = upright_actor(state.scene, state.actor).copy()
+
+    def act() -> list[Diagnostic]:
+        return export(selection, path, options=how) + notes
+
     saved = [each for actor in actors for each in _saved(actor)]
     if path.suffix.lower() in _RIGS:
         saved += [actor.figure for actor in actors]
-    save_in_background(state, lambda: export(selection, path, options=how), files, saved=saved)
+    save_in_background(state, act, files, saved=saved)
 
 
 def _saved(actor: Actor) -> list[object]:
