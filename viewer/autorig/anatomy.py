@@ -2,7 +2,9 @@
 
 Found in the voxels of its solid, given only the up axis:
 
-- The sagittal plane is the vertical plane in which the solid mirrors itself best.
+- The sagittal plane is the vertical plane in which the solid mirrors itself best. Unless it is a
+  nearly exact mirror image there, the best plane in another direction is a second candidate: the
+  front and the back of a person who holds a staff are more alike than the sides.
 - Limbs are protrusions from that plane: tips are maxima of the geodesic distance from it, as long
   as the protrusion is longer than others that it merges with (persistence; Edelsbrunner et al.
   2002). Hands and feet are found so in any pose in which they do not touch other parts, whatever

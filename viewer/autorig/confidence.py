@@ -13,9 +13,10 @@ says little. A rig is right if the limbs of the template are where the target ha
 - bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
 
-Nothing is said about what no threshold separates. Both sides are alike, as the fit scales them
-together. A rabbit has ears longer than its legs, and its head is no higher than that of a person
-whose rig is upside down.
+Measures that no threshold divides into right and wrong rigs are left out: differences between left
+and right, as the fit scales both together; the lengths of limbs relative to each other, as the ears
+of a rabbit are longer than its legs; and the height of the head alone, as that of a rabbit is no
+higher than in a person's rig that is upside down.
 
 Each finding is rated from 0, wrong, to 1, as for figures that are rigged well; the least rating is
 the confidence.

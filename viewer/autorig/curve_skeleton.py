@@ -3,9 +3,10 @@
 The limbs are the protrusions of the solid as seen from its trunk: tips are maxima of the geodesic
 distance (``medial.LevelSets``), and the shortest paths from them through the middle of the solid
 form a tree (Sato et al. 2000). It is made twice: first from the deepest voxel, to find the trunk,
-then from there. The trunk is where most limbs meet, so that no branch has most of the tips; the
-foot of what stands on one limb, such as a plant or a robot's arm; or the thicker end of what has no
-branches.
+then from there; and up to three times more from the middle of a trunk that is a plate, such as the
+top of a table, which each of them finds better. The trunk is where most limbs meet, so that no
+branch has most of the tips; the foot of what stands on one limb, such as a plant or a robot's arm;
+the thick part between two limbs; or the thicker end of what has no branches.
 
 - Loops are cut, as a skeleton has none: where they are narrow, as a hand that touches the hip, or
   farthest from the trunk.
@@ -14,7 +15,8 @@ branches.
 - Joints are where separate parts of a limb meet, as those of a robot's arm. Otherwise, they are
   where the path bends (Douglas and Peucker 1973) if it bends sharply a few times, as a leg does. A
   straight or smoothly curved limb gets joints at even distances, whose number grows with its length
-  relative to its width: tails, tentacles, snakes, fingers.
+  relative to its width: tails, tentacles, snakes, fingers. Where a bone would leave the solid, it
+  gets another joint.
 - Limbs on both sides of a plane of symmetry are paired. Both get the same number of joints, and
   mirrored positions if they are in mirrored poses.
 """
@@ -887,7 +889,7 @@ def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
         )
     if found.has_loops:
         yield note(
-            "R016.more-loops: not all loops are cut: of each other one, one side has no joints; "
+            "R016.more-loops: some loops are not cut: one side of each has no joints; "
             "--skeleton takes a skeleton that has them"
         )
     if found.missed > _MISSED:
