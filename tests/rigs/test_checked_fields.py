@@ -128,3 +128,17 @@ def test_arrays_and_lists_that_fit_stay_the_same_object():
     placed[0, 3] = 5.0
     actors.append(actor)
     assert actor.placement[0, 3] == 5.0 and len(made) == 2
+
+
+def test_numbers_near_the_largest_are_kept_without_a_warning():
+    actor, largest = scene()[0], np.finfo(float).max
+    actor.placement = np.full((4, 4), largest)
+    actor.pose.dofs = np.full(3, largest)
+    assert (actor.placement == largest).all() and (actor.pose.dofs == largest).all()
+
+
+def test_part_of_a_pose_may_be_set_to_itself_in_another_order():
+    pose = scene()[0].pose
+    pose.dofs = np.array([1.0, 2.0, 3.0])
+    pose.dofs = pose.dofs[::-1]
+    assert pose.dofs.tolist() == [3.0, 2.0, 1.0]

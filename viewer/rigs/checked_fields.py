@@ -283,7 +283,7 @@ def _array(shape: tuple[int | None, ...]) -> _Kind:
     def convert(name: str, value: Any) -> object:
         is_kept = type(value) is np.ndarray and value.dtype == _FLOAT and value.flags.writeable
         # Much faster than ``frozen``, which says what is wrong.
-        if is_kept and shape in (value.shape, (None,) * value.ndim) and _is_finite(value):
+        if is_kept and shape in (value.shape, (None,) * value.ndim) and are_finite(value):
             return value
         values = frozen(name, value.view() if is_kept else value, shape)
         return value if is_kept else values.copy()
@@ -291,9 +291,10 @@ def _array(shape: tuple[int | None, ...]) -> _Kind:
     return _Kind("an array of numbers", lambda value: value is not None, convert)
 
 
-def _is_finite(values: Floats) -> bool:
-    """Return whether no number is NaN or infinite, nor the sum so large that it may be one."""
-    return math.isfinite(np.add.reduce(values, None))
+def are_finite(values: Floats) -> bool:
+    """Return whether no number is NaN or infinite, nor so large that its square may be."""
+    # Twice as fast as ``isfinite``, and unlike a sum it never warns.
+    return math.isfinite(np.vdot(values, values))
 
 
 def _number(name: str, value: Any) -> object:
