@@ -239,7 +239,7 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
-_FASTEST_CAMERA = 2000.0  # frames per second of motion capture
+_FASTEST_CAMERA = 2000.0  # frames per second; for motion capture
 _LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
 _DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
@@ -290,8 +290,8 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     rate = _nearest_rate(frame_time, 1.0 / seconds)
     if rate > _FASTEST_CAMERA:
         source.warn(
-            "C017.bvh-fast: Frame Time: {found} seconds are {rate:,.0f} fps, more than cameras of "
-            "motion capture have ({remedy} overrides it)",
+            "C017.bvh-fast: Frame Time: {found} seconds is {rate:,.0f} fps, faster than motion "
+            "capture cameras ({remedy} overrides it)",
             found=bare(frame_time),
             rate=rate,
             remedy=Remedy("Frames per second in the Timeline", "--fps"),
