@@ -15,7 +15,7 @@ from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.diagnostics import described
 from viewer.diagnostics.record import JsonObject, Record, recorded
-from viewer.errors import ViewerError
+from viewer.errors import ViewerError, reason_of
 from viewer.interrupts import watched
 from viewer.phrases import printable
 
@@ -87,7 +87,7 @@ def _outcome(item: Item, call: Callable[[Item], object], record: Record) -> Resu
         return Result(item, "memory", _BAD_INPUT, message="not enough memory")
     except OSError as problem:
         where = "" if problem.filename is None else f"{problem.filename}: "
-        reason = printable(f"{where}{problem.strerror or problem}", _LONGEST)
+        reason = printable(f"{where}{reason_of(problem)}", _LONGEST)
         return Result(item, "failed", _UNWRITTEN, message=reason)
     except (Exception, SystemExit) as problem:
         # The only place that catches all exceptions: a batch runs unattended for hours, and a bug

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from viewer.data_classes import dataclass
-from viewer.errors import ViewerError
+from viewer.errors import ViewerError, reason_of
 from viewer.formats import FORMATS, all_suffixes
 from viewer.formats._published_models import published_names
 from viewer.media.file_names import natural_key
@@ -200,7 +200,7 @@ class _Search:
                 with os.scandir(folder) as found:
                     entries = [entry for entry in found if not entry.name.startswith(".")]
             except OSError as problem:
-                raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
+                raise ViewerError(f"{printable(folder, 300)}: {reason_of(problem)}") from None
             entries.sort(key=lambda entry: entry.name)
             identity = status.st_dev, status.st_ino
             if identity in visited:
@@ -232,7 +232,7 @@ def _listed(name: str) -> list[str]:
         else:
             data = Path(name).read_bytes()
     except OSError as problem:
-        raise ViewerError(f"{shown}: {problem.strerror or problem}") from None
+        raise ViewerError(f"{shown}: {reason_of(problem)}") from None
     separator = b"\0" if b"\0" in data else b"\n"
     lines = [os.fsdecode(line.rstrip(b"\r")) for line in data.split(separator)]
     paths = [line for line in lines if line.strip()]

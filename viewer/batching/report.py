@@ -19,7 +19,7 @@ from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.diagnostics.diagnostic import plain
 from viewer.diagnostics.record import JsonObject
-from viewer.errors import OutputError, ViewerError
+from viewer.errors import OutputError, ViewerError, reason_of
 from viewer.phrases import printable
 
 _ITEM_NAMES = [field.name for field in fields(Item)]
@@ -118,7 +118,7 @@ class ReportFile:
         return os.read(self._handle, 1) != b"\n"
 
     def _error(self, problem: OSError) -> OutputError:
-        return OutputError(f"{printable(self.path, 300)}: {problem.strerror or problem}")
+        return OutputError.at(self.path, problem)
 
 
 @contextlib.contextmanager
@@ -171,7 +171,7 @@ def read_results(path: Path) -> list[Result]:
                 if result is not None:
                     results[result.item.name, result.item.output] = result
     except OSError as problem:
-        raise ViewerError(f"{printable(path, 300)}: {problem.strerror or problem}") from None
+        raise ViewerError(f"{printable(path, 300)}: {reason_of(problem)}") from None
     if n_lines > 1 and not results:
         raise ViewerError(f"{printable(path, 300)}: expected the report of a batch")
     return list(results.values())

@@ -23,7 +23,7 @@ from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
-from viewer.errors import FormatError
+from viewer.errors import FormatError, reason_of
 from viewer.formats import SUFFIXES, Source
 from viewer.formats._archive.zip import (
     DAMAGE,
@@ -121,9 +121,7 @@ def _names_in(folder: Path) -> list[str]:
     root = folder.resolve()
 
     def fail(problem: OSError) -> None:
-        raise FormatError.fault(
-            "F001.submission: {reason}", folder, reason=problem.strerror or str(problem)
-        )
+        raise FormatError.fault("F001.submission: {reason}", folder, reason=reason_of(problem))
 
     for place, folders, files in os.walk(folder, onerror=fail):
         inside = Path(place).relative_to(folder)

@@ -280,8 +280,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
                 with contextlib.suppress(OSError):
                     path.rmdir()
         if isinstance(problem, OSError):
-            reason = problem.strerror or problem
-            raise OutputError(f"{printable(path, 300)}: {reason}") from None
+            raise OutputError.at(path, problem) from None
         raise
     shutil.rmtree(made, ignore_errors=True)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import platformdirs
 
 from viewer.data_classes import dataclass
-from viewer.errors import OutputError, ViewerError
+from viewer.errors import OutputError, ViewerError, reason_of
 from viewer.phrases import printable
 
 VARIABLE = "VIEWER_CONNECTION_FILE"
@@ -41,7 +41,7 @@ def _folder() -> Path:
         folder.mkdir(parents=True, mode=0o700, exist_ok=True)
         status = folder.stat()
     except OSError as problem:
-        raise OutputError(f"{printable(folder, 300)}: {problem.strerror}") from None
+        raise OutputError.at(folder, problem) from None
     # Another user may have created it first, where the system has no runtime folders.
     if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
         raise OutputError(
@@ -62,7 +62,7 @@ def write_file(path: Path, port: int, token: str) -> None:
             stream.write(text)
         aside.replace(path)
     except OSError as problem:
-        raise OutputError(f"{printable(path, 300)}: {problem.strerror}") from None
+        raise OutputError.at(path, problem) from None
 
 
 def read_file(path: Path) -> Connection | None:
@@ -74,7 +74,7 @@ def read_file(path: Path) -> Connection | None:
     except FileNotFoundError:
         return None
     except OSError as problem:
-        raise ViewerError(f"{printable(path, 300)}: {problem.strerror}") from None
+        raise ViewerError(f"{printable(path, 300)}: {reason_of(problem)}") from None
     is_own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
     if not is_own or (os.name == "posix" and stat.S_IMODE(status.st_mode) & 0o077):
         raise ViewerError(f"{printable(path, 300)}: expected a file that only you can read")

@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.errors import OutputError, RigError, ViewerError
+from viewer.errors import OutputError, RigError, ViewerError, reason_of
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
 from viewer.exporters.vrm.humanoid import ancestors_of, human_bones, parent_bone
 from viewer.formats._vrm.bones import modern_bone
@@ -101,8 +101,7 @@ class Counts:
 
 
 def _no_address(option: str, host: str, port: int, problem: Exception) -> str:
-    why = getattr(problem, "strerror", None) or problem
-    return f"{option} {printable(host, 60)}:{port}: {why}"
+    return f"{option} {printable(host, 60)}:{port}: {reason_of(problem)}"
 
 
 class Receiver:

@@ -97,7 +97,7 @@ def save_results(job: str, table: str, overview: str, results: Sequence[Result])
         try:
             Path(path).absolute().parent.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
-            raise OutputError(f"{printable(path, 300)}: {problem.strerror}") from None
+            raise OutputError.at(path, problem) from None
     if table:
         n_rows = save_table(table, job, results)
         lines.append(f"{printable(table, 300)}: table of {counted(n_rows, 'item')}")
