@@ -187,6 +187,15 @@ def test_actors_of_zero_width_are_spaced_from_wide_ones(files):
     assert spans(viewer.load(*paths)) == [(0, 0), (1, 5)]
 
 
+def test_body_with_its_origin_inside_stands_beside_a_figure_on_the_ground():
+    body, fox = viewer.load("body", "fox").actors
+    low = body.figure.mesh.positions[:, 1].min()
+    assert low < -0.8  # the origin is at the pelvis
+    assert body.placement[1, 3] == pytest.approx(-low) and fox.placement[1, 3] == 0.0
+    # Two bodies keep the heights of their files.
+    assert [actor.placement[1, 3] for actor in viewer.load("body", "body").actors] == [0.0, 0.0]
+
+
 # Recognition
 
 

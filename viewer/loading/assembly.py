@@ -95,7 +95,7 @@ def begin(
     scale_to_one_unit(draft)
     if settings is not None and settings.springs:
         _switch_on_springs(draft, world_up)
-    place_side_by_side(draft)
+    place_side_by_side(draft, world_up)
     draft.views += placed_views(draft)
     _note_unused_options(contents, draft, settings or MotionSettings())
     faults = _faults(contents, draft.actors) if checks else []

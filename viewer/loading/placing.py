@@ -9,6 +9,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.loading.scaling import known_unit, scale_to_unit, scaling
 from viewer.loading.scene_draft import SceneDraft
+from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.transform import rotation_transform, translation_matrix
 from viewer.rigs.scene import Actor, Scene, scene_box, scene_unit
 from viewer.rigs.units import METRES
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from viewer.rigs.figure import FigureGroup
 
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
+# Distances of the lowest point from height 0, relative to a figure's height: it stands there up to
+# the first, and from the second on, its origin is inside it, as in body models (the pelvis).
+_STANDS, _INSIDE = 0.05, 0.25
 
 
 def stand_up(draft: SceneDraft, world_up: str) -> None:
@@ -54,14 +58,20 @@ def scale_to_one_unit(draft: SceneDraft) -> None:
         builder.unit = unit
 
 
-def place_side_by_side(draft: SceneDraft) -> None:
-    """Move actors without their own position to the right of the actors before them, by groups."""
+def place_side_by_side(draft: SceneDraft, world_up: str) -> None:
+    """Move actors without their own position to the right of the actors before them, by groups.
+
+    Those whose origin is inside them are lifted to height 0 if others stand there.
+    """
     loose = _by_group(draft)
     placed = [a for a, placed in zip(draft.actors, draft.placed, strict=True) if placed]
     if not loose or len(loose) + len(placed) < 2:
         return
     # Bounds of the drawn scene exclude stray vertices, which would displace the next actor.
-    spans = [scene_box(Scene(group))[:, 0] for group in loose]
+    boxes = [scene_box(Scene(group)) for group in loose]
+    if not placed:
+        _lift(loose, boxes, 2 if world_up == "z" else 1)
+    spans = [box[:, 0] for box in boxes]
     if placed:
         before = scene_box(Scene(placed))[:, 0]
     else:
@@ -75,6 +85,20 @@ def place_side_by_side(draft: SceneDraft) -> None:
             actor.placement = shift @ actor.placement
         edge += gap + high - low
         before = span
+
+
+def _lift(groups: list[list[Actor]], boxes: list[Floats], up: int) -> None:
+    """Lift groups whose origin is inside them to height 0 if others stand there."""
+    lows = np.array([box[0, up] for box in boxes])
+    heights = np.array([box[1, up] for box in boxes]) - lows
+    if not (np.abs(lows) <= _STANDS * heights).any():
+        return
+    for group, low, height in zip(groups, lows, heights, strict=True):
+        if -height < low < -_INSIDE * height:
+            shift = np.zeros(3)
+            shift[up] = -low
+            for actor in group:
+                actor.placement = translation_matrix(shift) @ actor.placement
 
 
 def _by_group(draft: SceneDraft) -> list[list[Actor]]:
