@@ -24,6 +24,8 @@ def short_number(value: float) -> str:
 def round_step(least: float) -> float:
     """Return the smallest of 1, 2 and 5 times a power of ten that is not below a number.
 
+    A step that is smaller by up to 0.1 % is taken, too.
+
     >>> [round_step(x) for x in (0.2, 0.21, 1.5, 3.0, 11.0, 60.0)]
     [0.2, 0.5, 2.0, 5.0, 20.0, 100.0]
     """

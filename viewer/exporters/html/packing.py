@@ -3,7 +3,7 @@
 Differences are those of consecutive rows or, for values of the vertices of a mesh, from the fourth
 corner of a parallelogram (Touma and Gotsman 1998, "Triangle Mesh Compression", section 3): row r is
 stored as x_r - (x_a + x_b - x_c), where a, b, c < r are corners of two triangles with a common edge
-a b. Smooth values need half as many bytes so.
+a b. This halves the bytes of smooth values.
 
 ``decode.js`` is the reader of the page; ``unpacked`` reads the same text for the measured losses.
 """

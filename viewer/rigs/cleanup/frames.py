@@ -74,7 +74,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
     return with_rows(clip, again, lambda name, _: getattr(found, name))
 
 
-# Interrupted tracks
+# Interrupted tracks.
 
 Span = tuple[int, int]
 

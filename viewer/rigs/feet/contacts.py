@@ -240,7 +240,7 @@ class MovingGround:
     velocity: Floats
     """(3,). Per second."""
     slips: float
-    """As of ``foot_contacts``, 1 to 2: how unevenly standing feet move with it."""
+    """How unevenly standing feet move with it, 1 to 2; see ``foot_contacts``."""
 
 
 def moving_ground(

@@ -66,7 +66,7 @@ _TOGETHER, _APART = 0.08, 0.17  # the same for two wrists: 0.06 where hands clap
 # Distance from where a hand should be that is left, so that limbs keep their directions: about 2 %
 # of the height of a person.
 _SLACK = 0.025
-# The length s of the smooth curve of a hand's shift, seconds; as of feet, see ``planting``.
+# The length s of the smooth curve of a hand's shift, seconds; as for feet, see ``planting``.
 _EASE = 0.15
 _EXTENDED = 0.97  # maximum extension of an arm: its elbow is bent by 28 degrees
 _SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _SLACK
@@ -341,7 +341,7 @@ def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
 
 def _eased(shifts: list[Floats], nearness: list[Floats], timing: Timing) -> list[Floats]:
     """Return curves (N, 3) through the shifts of hands at the body, which fade around them."""
-    # As of planted feet: a row is held the more firmly, the nearer the hand is.
+    # As for planted feet: the nearer the hand is to the body, the more firmly a row is held.
     targets, holds = np.stack(shifts), np.stack(nearness)
     result = np.empty_like(targets)
     for start, stop in spans_of(timing):

@@ -220,8 +220,8 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     """Return each joint's name in the SMPL family, unique, or "" without an equivalent.
 
     Spine joints are numbered from the pelvis; of more than three, the first, middle and last count.
-    Without a pelvis, the joint above both legs is it;
-    a hand or foot with an unknown name is the joint below the elbow or knee.
+    Without a pelvis, the joint above both legs is it. A hand or foot with an unknown name is the
+    joint below the elbow or knee.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
