@@ -16,7 +16,7 @@ from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip, full_map, matches_of
 from viewer.rigs.retargeting.joint_map import JointMap
-from viewer.rigs.retargeting.joint_names import canonical_names
+from viewer.rigs.retargeting.joint_names import canonical_names, other_side, sided_words
 from viewer.rigs.retargeting.retarget import retarget
 
 
@@ -185,3 +185,24 @@ def test_hips_beside_the_legs_are_the_spine_of_the_joint_above_both():
     # Legs below the root leave the hips what they are.
     parents[[6, 8]] = 0
     assert dict(zip(names, canonical_names(names, parents), strict=True))["Hips"] == "pelvis"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("bras_gauche", "bras_droit"),
+        ("MainGauche", "MainDroite"),
+        ("brazo_izquierdo", "brazo_derecho"),
+        ("Pierna.Izq", "Pierna.Der"),
+        ("gamba_sinistra", "gamba_destra"),
+        ("braccio_sinistro", "braccio_destro"),
+        ("piede_sx", "piede_dx"),
+    ],
+)
+def test_sides_have_french_spanish_and_italian_words(names):
+    (left, word), (right, other) = sided_words(names)
+    assert (left, right) == ("left", "right") and word == other
+    # In French, the arm is masculine and the hand is not; the left side does not show it.
+    left_name, right_name = names
+    assert other_side(right_name) == left_name
+    assert other_side(left_name) in (right_name, right_name + "e")

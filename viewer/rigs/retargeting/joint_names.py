@@ -108,13 +108,16 @@ _SIDES = {
     **dict.fromkeys(("l", "left", "lft", "lt", "links", "hidari", "左"), "left"),
     **dict.fromkeys(("r", "right", "rgt", "rt", "rechts", "migi", "右"), "right"),
     # French, Spanish and Italian
-    **dict.fromkeys(("gauche", "izq", "izquierda", "izquierdo", "sx"), "left"),
-    **dict.fromkeys(("droite", "der", "derecha", "derecho", "dx"), "right"),
+    **dict.fromkeys(("gauche", "izq", "izquierda", "izquierdo"), "left"),
+    **dict.fromkeys(("droit", "droite", "der", "derecha", "derecho"), "right"),
+    **dict.fromkeys(("sx", "sinistra", "sinistro"), "left"),
+    **dict.fromkeys(("dx", "destra", "destro"), "right"),
 }
 _PAIRS = (
     *(("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi")),
-    *(("links", "rechts"), ("gauche", "droite"), ("izq", "der"), ("sx", "dx")),
+    *(("links", "rechts"), ("gauche", "droit"), ("gauche", "droite"), ("izq", "der"), ("sx", "dx")),
     *(("izquierda", "derecha"), ("izquierdo", "derecho")),
+    *(("sinistra", "destra"), ("sinistro", "destro")),
 )
 _OTHER_SIDES = dict([*_PAIRS, ("左", "右"), *((b, a) for a, b in _PAIRS), ("右", "左")])
 # Prefixes that are removed before the side or word is identified.
