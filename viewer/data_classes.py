@@ -22,7 +22,7 @@ def setting(default: Any, help: str = "", **metadata: Any) -> Any:
     ``default``: its only statement; a list is copied. ``help``: text of the option, in which
     ``{default}`` stands for the default. ``metadata``: other facts, which
     ``viewer.commands._settings`` lists; panels use ``choices``, ``limits``, and for sliders
-    ``unit``, the format of the number, and ``logarithmic``.
+    ``unit``, the format of the number, ``logarithmic``, and ``slider``, ends within the limits.
     """
     of = {"default_factory": default.copy} if isinstance(default, list) else {"default": default}
     return dataclasses.field(**of, metadata={"help": help, **metadata})

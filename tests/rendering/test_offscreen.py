@@ -35,6 +35,17 @@ def draw(offscreen: Offscreen, scene: Scene, size=(64, 48), samples=4):
     return offscreen.render(scene, size, default_camera(scene, size), options, scene_box(scene))
 
 
+def test_azimuth_of_a_light_has_no_ends(scene):
+    pictures = []
+    for azimuth in (-160.0, 200.0, 920.0):
+        options = DisplayOptions(quality="draft")
+        options.lights.key.azimuth = azimuth
+        pictures.append(viewer.render(scene, size=(64, 48), options=options).astype(int))
+    assert all(np.abs(each - pictures[0]).max() <= 1 for each in pictures[1:])
+    options.lights.key.azimuth = 20.0
+    assert (viewer.render(scene, size=(64, 48), options=options) != pictures[0]).any()
+
+
 def test_rows_are_returned_from_the_top(scene):
     pixels = viewer.render(scene, size=(64, 48))
     assert (pixels.shape, pixels.dtype) == ((48, 64, 4), np.uint8)

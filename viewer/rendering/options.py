@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -75,6 +76,7 @@ QUALITIES: dict[Quality, str] = {
 """Render quality presets, with menu labels."""
 
 _DEGREES = "%.0f\N{DEGREE SIGN}"
+_POSITIVE = 0.0, math.inf  # limits of strengths; sliders end earlier
 
 
 @checked
@@ -82,13 +84,13 @@ _DEGREES = "%.0f\N{DEGREE SIGN}"
 class Light:
     """A directional light."""
 
-    azimuth: float = setting(0.0, limits=(-180.0, 180.0), unit=_DEGREES)
+    azimuth: float = setting(0.0, slider=(-180.0, 180.0), unit=_DEGREES)
     inclination: float = setting(0.0, limits=(-90.0, 90.0), unit=_DEGREES)
     """Direction from which the light comes, degrees about the up axis and above the horizon;
     relative to the camera if the lights follow it, otherwise to the scene."""
     color: Color = (1.0, 1.0, 1.0)
     """(r, g, b). Linear, 0 to 1."""
-    strength: float = setting(1.0, limits=(0.0, 4.0))
+    strength: float = setting(1.0, limits=_POSITIVE, slider=(0.0, 4.0))
     """Multiplier of the colour."""
 
 
@@ -100,15 +102,15 @@ class Lights:
     key: Light = field(default_factory=lambda: Light(-42.0, 40.0, (1.0, 0.86, 0.68), 1.05))
     rim: Light = field(default_factory=lambda: Light(114.0, 16.0, (0.30, 0.54, 1.0), 1.15))
     """Warm light from the front; cool light from behind on the opposite side."""
-    ambient: float = setting(0.26, limits=(0.0, 1.0))
+    ambient: float = setting(0.26, limits=_POSITIVE, slider=(0.0, 1.0))
     """Strength of the ambient light."""
     sky: Color = (0.76, 0.88, 1.0)
     ground: Color = (0.44, 0.36, 0.31)
     """(r, g, b). Colours of the ambient light on surfaces that face up and down, linear."""
-    specular: float = setting(0.18, limits=(0.0, 2.0))
+    specular: float = setting(0.18, limits=_POSITIVE, slider=(0.0, 2.0))
     shininess: float = setting(32.0, limits=(1.0, 512.0), unit="%.0f", logarithmic=True)
     """Strength and exponent of the Blinn-Phong highlight."""
-    studio: float = setting(1.0, limits=(0.0, 2.0))
+    studio: float = setting(1.0, limits=_POSITIVE, slider=(0.0, 2.0))
     """Strength of the studio that lights metallic-roughness surfaces."""
     follow_camera: bool = True
     """Whether the directions rotate with the camera."""

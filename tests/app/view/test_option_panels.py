@@ -209,6 +209,16 @@ def test_light_slider_is_one_step_and_can_be_reset(tall, part):
     assert tall.state.options.lights != Lights()
 
 
+def test_light_beyond_its_sliders_is_kept(tall):
+    key = tall.state.options.lights.key
+    key.azimuth, key.strength = 200.0, 6.0
+    _show_lights(tall)
+    tall.drag("Rim Azimuth", 0.9)
+    assert (key.azimuth, key.strength) == (200.0, 6.0)
+    tall.drag("Key Azimuth", 0.9)
+    assert -180.0 <= key.azimuth <= 180.0 and key.strength == 6.0
+
+
 def test_lights_can_be_fixed_to_the_scene(tall):
     _show_lights(tall)
     tall.click("Follow the camera")

@@ -317,7 +317,7 @@ def draw_setting(
             new = count_slider(state, label, value, facts["limits"], flags=_CLAMP)
         else:
             flags = _CLAMP | _LOGARITHMIC if facts.get("logarithmic") else _CLAMP
-            low, high = facts["limits"]
+            low, high = facts.get("slider") or facts["limits"]
             new = slider(state, label, value, low, high, facts.get("unit", "%.2f"), flags)
         explain(text, why)
     if new != value:
