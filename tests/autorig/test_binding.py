@@ -148,8 +148,8 @@ def test_small_separate_part_moves_rigidly_and_is_named():
         assert (of(rigged, "middle")[-8:] == 1.0).all()
         (line,) = (str(line) for line in rigged.lines if line.code == "R007")
         assert line == (
-            f"the part of 8 vertices at vertex {len(BAR[0])} is nearest to one bone: it moves "
-            "rigidly with joint middle"
+            f"the part of 8 vertices at vertex {len(BAR[0])} moves rigidly with joint middle, as "
+            "it is nearest to one bone or cannot bend"
         )
 
 
@@ -165,6 +165,11 @@ def test_part_that_two_sides_share_moves_with_the_joint_above_both(method):
                    name + "_end": (name + "_2", (0.9 * x, 0.1, 0))}  # fmt: skip
     rigged = bound(skeleton_of(joints), joined(*posts, beam), method)
     assert (of(rigged, "middle")[-8:] == 1.0).all()
+    idle = [name for name in ("middle", "left", "left_2", "right", "right_2")
+            if not of(rigged, name).any()]  # fmt: skip
+    assert "right" in idle and "middle" not in idle
+    (line,) = [str(line) for line in rigged.lines if "no weights" in str(line)]
+    assert line.startswith(f"no weights: {', '.join(idle)}; the vertices around ")
     # Of one line of joints, none is above branches: the part keeps its weights.
     line = box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), (1, 1, 1))
     shared = bound(skeleton_of(CHAIN), joined(line, box((3, 0, 0), (3.1, 0.1, 0.1), (1, 1, 1))))

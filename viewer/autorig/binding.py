@@ -30,7 +30,7 @@ from viewer.autorig.weights.result import RigidIslands, WeightTransfer, rigid_li
 from viewer.autorig.weights.weight_transfer import WeightSettings, skin_of, smooth
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
-from viewer.phrases import counted, listed, printable, rounded
+from viewer.phrases import agree, counted, listed, printable, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
@@ -446,7 +446,8 @@ def _bone_lines(skeleton: Skeleton, bones: Bones, skin: Skin) -> Iterator[Diagno
     moved = np.intersect1d(inner, idle_joints(skin, skeleton))
     if len(moved):
         yield note(
-            "R008.stiff-parts: no weights: {idle}; the vertices around them move with other "
+            "R008.stiff-parts: no weights: {idle}; the vertices around {them} move with other "
             "joints, as parts that do not bend do",
+            them=agree(len(moved), "it", "them"),
             idle=listed([joint_label(skeleton, joint) for joint in moved.tolist()], 8),
         )
