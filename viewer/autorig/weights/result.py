@@ -127,8 +127,8 @@ def rigid_lines(rigid: RigidIslands, from_bones: bool = False) -> Iterator[Diagn
     )
     if from_bones:
         key = (
-            "R007.bone-part: the part of {n} at vertex {vertex} moves rigidly with joint {joint}, as "
-            "it is nearest to one bone or cannot bend"
+            "R007.bone-part: the part of {n} at vertex {vertex} moves rigidly with joint {joint}, "
+            "as it is nearest to one bone or cannot bend"
         )
     order = np.argsort(-rigid.counts, kind="stable")
     for island in order[:_LISTED]:
