@@ -3,10 +3,10 @@
 import itertools
 import os
 import signal
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -141,24 +141,29 @@ def test_workers_that_dask_gives_up_are_replaced(monkeypatch):
     assert {n for n, one in found.items() if one.status != "done"} == {5}
 
 
-def test_workers_that_never_connect_are_replaced_under_another_name(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(dask_cluster.time, "monotonic", lambda: now[0])
-    scaled = []
-    cluster = SimpleNamespace(
-        worker_spec={0: {}, 1: {}}, workers={0: "nanny", 1: "nanny"}, scale=scaled.append
-    )
-    workers = dask_cluster._LocalWorkers(cluster, 2)
-    for seconds, connected in ((0.0, "01"), (50.0, "0"), (80.0, "0"), (89.0, "0")):
-        now[0] = 100.0 + seconds
-        workers.check(connected)
-    assert not scaled and cluster.worker_spec.keys() == {0, 1}
-    now[0] = 191.0
-    workers.check("0")
-    assert scaled == [2] and cluster.worker_spec.keys() == {0}
-    del cluster.workers[1]  # as Dask does after its own time limit
-    workers.check("0")
-    assert scaled == [2, 2]
+def test_workers_that_end_unseen_by_dask_are_replaced(monkeypatch):
+    monkeypatch.setattr(dask_cluster, "_ABSENT", 0.5)
+    limits = Limits(2, cluster="local")
+    with dask_cluster._connected(dask_cluster.parse_cluster("local"), limits) as (client, check):
+        cluster = client.cluster
+        first = cluster.workers[1]
+        monkeypatch.setattr(first, "_on_worker_exit", unseen)
+        os.kill(first.pid, signal.SIGKILL)
+        end = time.monotonic() + 60.0
+        while cluster.workers.get(1, first) is first or len(connected(client)) < 2:
+            assert time.monotonic() < end, cluster.workers
+            check(connected(client))
+            time.sleep(0.05)
+        assert connected(client) == {"0", "1"}
+
+
+async def unseen(exit_code):
+    """Do nothing, like a nanny that does not watch its worker yet."""
+
+
+def connected(client):
+    workers = client.scheduler_info(n_workers=-1)["workers"].values()
+    return {str(one["name"]) for one in workers}
 
 
 def test_two_thousand_files_of_which_some_are_broken(address, tmp_path):

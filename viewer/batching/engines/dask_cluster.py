@@ -417,11 +417,14 @@ class _LocalWorkers:
             name: now if str(name) in names else self._seen.get(name, now) for name in wanted
         }
         # Dask does not notice if a worker ends in the instant after its start, before its nanny
-        # watches it. A spec with another name replaces it; the nanny without a spec is closed.
+        # watches it. The nanny is closed as soon as it has no spec; a new spec gets the same name,
+        # so if it came earlier, it would be taken for the old nanny's.
         absent = [name for name in wanted if now > self._seen[name] + _ABSENT]
         for name in absent:
             del self._cluster.worker_spec[name]
-        if absent or len(self._cluster.workers) < self._n_workers:
+        if absent:
+            self._cluster.scale(len(self._cluster.worker_spec))
+        elif len(self._cluster.workers) < self._n_workers:
             self._cluster.scale(self._n_workers)
 
 
