@@ -142,12 +142,10 @@ def _matches(values: Floats, off: Floats, known: Bools, n_frames: int, least: fl
     count = len(off) - width + 1
     # Row r of a window is about the pop that begins in frame r + 2.
     windows = np.lib.stride_tricks.sliding_window_view(off, width, axis=0)
-    # The pattern's factor by least squares, and the error that remains.
-    factors = windows @ pattern / (pattern @ pattern)
-    size = np.linalg.norm(factors, axis=2)
-    if not (size > least).any():
+    fit = _fitted(windows, pattern, least)
+    if fit is None:
         return result
-    errors = np.linalg.norm(windows - factors[..., None] * pattern, axis=2).max(axis=2)
+    size, errors = fit
     peak = size * pattern.max()
     lengths = np.linalg.norm(off, axis=2)
     around = [*range(-_AROUND, 0), *range(width, width + _AROUND)]
@@ -168,6 +166,18 @@ def _matches(values: Floats, off: Floats, known: Bools, n_frames: int, least: fl
     return result
 
 
+def _fitted(windows: Floats, pattern: Floats, least: float) -> tuple[Floats, Floats] | None:
+    """Return the size of a pattern in windows (F, N, 3, P) by least squares, and the error left.
+
+    (F, N) each; None if no size exceeds ``least``.
+    """
+    factors = windows @ pattern / (pattern @ pattern)
+    size = np.linalg.norm(factors, axis=2)
+    if not (size > least).any():
+        return None
+    return size, np.linalg.norm(windows - factors[..., None] * pattern, axis=2).max(axis=2)
+
+
 def _quick_matches(values: Floats, known: Bools, n_frames: int, least: float) -> Floats:
     """Return the size of pops of ``n_frames`` by fourth differences, else 0: (F, N)."""
     pattern, result = np.array(_FOURTH[n_frames]), np.zeros(values.shape[:2])
@@ -177,11 +187,10 @@ def _quick_matches(values: Floats, known: Bools, n_frames: int, least: float) ->
         return result
     # Row r of a window is about the pop that begins in frame r + 4.
     windows = np.lib.stride_tricks.sliding_window_view(fourth, width, axis=0)
-    factors = windows @ pattern / (pattern @ pattern)
-    size = np.linalg.norm(factors, axis=2)
-    if not (size > least).any():
+    fit = _fitted(windows, pattern, least)
+    if fit is None:
         return result
-    errors = np.linalg.norm(windows - factors[..., None] * pattern, axis=2).max(axis=2)
+    size, errors = fit
     peak = size * np.abs(pattern).max()
     around = [*range(-_AROUND, 0), *range(width, width + _AROUND)]
     others = largest_around(np.linalg.norm(fourth, axis=2), around)[:count]
