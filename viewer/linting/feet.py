@@ -15,6 +15,7 @@ from viewer.rigs.feet import limits
 from viewer.rigs.feet.contacts import (
     Contact,
     FootPath,
+    along_ground,
     foot_contacts,
     half_window,
     mean_speeds,
@@ -283,7 +284,7 @@ def _slipped(
     carried = np.repeat(glides[:, None], len(feet), axis=1)
     if ground is not None:
         # Of a walk in place, the body moves less than half as fast as a foot that swings.
-        across = np.eye(3) - np.diag(axis_vector(subject.up))
+        across = along_ground(axis_vector(subject.up))
         body_speeds = np.linalg.norm(np.gradient(body @ across, step, axis=0), axis=1)
         carried |= body_speeds[:, None] > _ALONG * speeds
     slides = _sliding(speeds / track.body, touches & ~stands, stands, carried, step)
@@ -326,7 +327,7 @@ def _slipped(
 def _drifts(path: FootPath, contact: Contact, size: float, up: Floats) -> bool:
     """Return whether a foot that stands is carried along by its hip, however slowly."""
     rows = slice(contact.start, contact.stop)
-    across = np.eye(3) - np.outer(up, up)
+    across = along_ground(up)
     # The end of the foot that moves least: it may turn about the other one.
     ways = [(point[rows][-1] - point[rows][0]) @ across for point in (path.toe, path.heel)]
     way = min(ways, key=lambda each: float(np.linalg.norm(each)))
@@ -357,7 +358,7 @@ def _drifting(
         return
     slowest = np.where(touches, speeds, np.inf).min(axis=1)[rows]
     path = np.mean([foot.hip for foot in track.paths], axis=0)
-    travel = (path[there[-1]] - path[there[0]]) @ (np.eye(3) - np.diag(axis_vector(subject.up)))
+    travel = (path[there[-1]] - path[there[0]]) @ along_ground(axis_vector(subject.up))
     distance = float(np.linalg.norm(travel))
     # Faster than any foot that slides, the body runs or flies.
     speed = float(np.quantile(slowest, _RARELY))
@@ -393,7 +394,7 @@ def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
 def _carried_slowly(track: Track, body: Floats, speeds: Floats, low: Bools, up: Floats) -> Bools:
     """Return where low feet (F, N) are too slow to swing, and all move along with the body."""
     # Of a body that stands or walks, at least one foot stays behind.
-    across = np.eye(3) - np.outer(up, up)
+    across = along_ground(up)
     with_body = [
         _moves_with(path.heel @ across, body @ across, _ALONG_GROUND) for path in track.paths
     ]

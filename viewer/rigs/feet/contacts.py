@@ -196,6 +196,11 @@ def half_window(rate: float, seconds: float = limits.WINDOW) -> int:
     return max(1, round(0.5 * seconds * rate))
 
 
+def along_ground(up: Floats) -> Floats:
+    """Return the projection (3, 3) that removes the part along a unit vector (3,)."""
+    return np.eye(3) - np.outer(up, up)
+
+
 def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
     half = half_window(rate)
@@ -212,7 +217,7 @@ def slowest_points(
     # A foot that rolls or turns about its ball or its heel does not slide, although the other end
     # moves.
     low, result = foot.lowest(up), np.zeros(len(foot.toe))
-    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
+    across = along_ground(up)
     for first, last in spans:
         part, found = slice(first, last), []
         for points in (foot.toe[part], foot.heel[part]):
@@ -295,7 +300,7 @@ def _lowest_velocities(foot: FootPath, rows: Ints, half: int, up: Floats) -> Flo
 
 def _velocities(path: Floats, rows: Ints, half: int, up: Floats) -> Floats:
     """Return the displacement per row around each row, along the ground."""
-    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
+    across = along_ground(up)
     return (path[rows + half] - path[rows - half]) / (2.0 * half) @ across
 
 
