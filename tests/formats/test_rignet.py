@@ -1,4 +1,4 @@
-"""Text rigs of networks that predict skeletons."""
+"""Skeletons that networks predict, as text and as arrays."""
 
 import numpy as np
 import pytest
@@ -88,3 +88,101 @@ def test_file_opens_and_unknown_lines_are_named(tmp_path, capsys):
     assert viewer.load(path).actors[0].figure.skeleton.n_joints == 3
     assert run(["info", str(path)]) == 0
     assert f'{path}:10: skipped unknown keyword "version"' in capsys.readouterr().err
+
+
+PLACES = np.array([[0.1, 0.9, 0.0], [0.0, 0.1, 0.0], [0.0, 0.5, 0.02]])
+NAMES = ("tip", "hips", "chest")
+
+
+def saved(path, **arrays):
+    np.savez(path, **arrays)
+    return path
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        # Arrays beside a mesh whose influences are called joints.
+        {"J": PLACES, "parents": np.array([2, -1, 1]), "joints": np.zeros((9, 4), np.uint16),
+         "names": np.array(NAMES), "V": np.zeros((9, 3))},
+        # UniRig: half precision, lists of objects, and None for what it does not know.
+        {"joints": PLACES.astype(np.float16), "parents": np.array([2, None, 1]),
+         "names": np.array(NAMES, dtype=object), "tails": None, "cls": "x"},
+        # SMPL's root in unsigned integers.
+        {"J": PLACES, "parents": np.array([2, 2**32 - 1, 1], dtype=np.uint32), "names": NAMES},
+        # Articulation-XL.
+        {"joints": PLACES, "bones": np.array([[1, 2], [2, 0]]), "joint_names": NAMES},
+        {"joint_positions": PLACES, "parents": np.array([2, 1, 1]), "names": NAMES},
+    ],
+)  # fmt: skip
+def test_arrays_are_the_same_skeleton_as_the_text(tmp_path, arrays):
+    figure = viewer.load(saved(tmp_path / "predicted.npz", **arrays)).actors[0].figure
+    skeleton = figure.skeleton
+    assert skeleton.names == ("hips", "chest", "tip")
+    assert skeleton.parents.tolist() == [-1, 0, 1]
+    assert_allclose(
+        np.cumsum(skeleton.rest_translations, axis=0),
+        PLACES[[1, 2, 0]],
+        atol=1e-3,  # of half precision
+    )
+
+
+def test_arrays_without_names_and_with_two_roots(tmp_path):
+    path = saved(tmp_path / "a.npz", J=PLACES, parents=np.array([-1, -1, 1]), names=None)
+    skeleton = viewer.load(path).actors[0].figure.skeleton
+    assert skeleton.names == ("joint_0", "joint_1", "joint_2")
+    assert skeleton.parents.tolist() == [-1, -1, 1]
+
+
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [
+        ({"J": PLACES, "parents": [3, -1, 1]},
+         "parents: expected joints from 0 to 2, found 3"),
+        ({"J": PLACES, "parents": [2, -1, 0]},
+         "parents: expected joints below a root, found joint 0 below itself"),
+        ({"J": PLACES, "parents": [2, -1]}, "parents: expected 3 numbers, found 2 int64"),
+        ({"J": PLACES, "parents": [0.5, -1, 1]},
+         "parents: expected joints from 0 to 2, found 0.5"),
+        ({"J": PLACES, "bones": [[1, 2], [1, 3]]},
+         "bones: expected joints from 0 to 2, found 3"),
+        ({"J": PLACES, "bones": [[1, 2], [0, 2]]},
+         "bones: expected one parent of joint 2, found several"),
+        ({"J": PLACES, "parents": [2, -1, 1], "names": ["a", "b"]},
+         "names: expected 3 names, found 2"),
+        ({"J": PLACES[:0], "parents": np.zeros(0)},
+         "J: expected at least one row, found none"),
+        ({"positions": np.zeros((5, 3, 3)), "parents": [2, -1, 1]},
+         "expected positions of joints (J, 3) as J or joints or joint_positions, found the keys "
+         "positions, parents"),
+    ],
+)  # fmt: skip
+def test_arrays_that_are_no_skeleton_are_refused(tmp_path, arrays, said):
+    path = saved(tmp_path / "a.npz", **arrays)
+    with pytest.raises(FormatError) as caught:
+        viewer.load(path)
+    assert str(caught.value) == f"{path}: {said}"
+
+
+def test_mesh_is_bound_to_predicted_arrays(tmp_path):
+    # A box of 1 x 4 x 1 with a ring of vertices at every unit: each end moves with its joint.
+    heights = np.arange(5.0)
+    ring = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    lines = [f"v {x} {y} {z}" for y in heights for x, z in ring]
+    lines += ["f 1 2 3 4", "f 20 19 18 17"]
+    for level in range(4):
+        for side in range(4):
+            a, b = 4 * level + side + 1, 4 * level + (side + 1) % 4 + 1
+            lines.append(f"f {a} {a + 4} {b + 4} {b}")
+    (tmp_path / "box.obj").write_text("\n".join(lines))
+    places = np.array([[0.0, 3.9, 0.0], [0.0, 0.1, 0.0], [0.0, 2.0, 0.0]])
+    path = saved(tmp_path / "a.npz", joints=places, parents=np.array([2, None, 1]), names=NAMES)
+    lines = [f"joints {name} {x} {y} {z}" for name, (x, y, z) in zip(NAMES, places, strict=True)]
+    text = tmp_path / "a.txt"
+    text.write_text("\n".join([*lines, "root hips", "hier hips chest", "hier chest tip"]))
+    ours, theirs = (
+        viewer.rig(tmp_path / "box.obj", skeleton=file).actors[0].figure for file in (path, text)
+    )
+    assert ours.skeleton.names == theirs.skeleton.names == ("hips", "chest", "tip")
+    assert_allclose(ours.skin.weights, theirs.skin.weights, atol=0.0)
+    assert len(ours.skin.starts) == 21

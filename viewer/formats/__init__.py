@@ -124,9 +124,6 @@ FORMATS = {
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
     ),
     "rig": Format("rig (CSE169)", (".rig",), rb"\Arig\b[^{}]*\{", writes=False),
-    "rignet": Format(
-        "rig text (RigNet)", (".txt",), rb"\Ajoints[ \t]+\S+[ \t]+[-+.\d]", writes=False
-    ),
     "obj": Format(
         "mesh (Wavefront)",
         (".obj",),
@@ -209,6 +206,14 @@ FORMATS = {
         (".json", ".npz", ".txt"),
         rb"\A\{|\A[-+]?\.?\d[-+.\deE]*(?:\s|\Z)",
         keys=("poses", "pose", "fullpose", "global_orient", "body_pose", "dofs", "betas"),
+    ),
+    # The last row, as archives of models and motions may have parents, too.
+    "rignet": Format(
+        "predicted skeleton (RigNet)",
+        (".txt", ".npz"),
+        rb"\Ajoints[ \t]+\S+[ \t]+[-+.\d]",
+        keys=("parents", "bones"),
+        writes=False,
     ),
 }
 """Modules in this folder; each has ``read(source)``, ``write(content, path)``, or both."""

@@ -1,15 +1,19 @@
-r"""Reader of text rigs of networks that predict skeletons (RigNet, MagicArticulate, Puppeteer).
+r"""Reader of skeletons that networks predict (RigNet, MagicArticulate, Puppeteer, UniRig).
 
-::
+A text, or an archive of arrays::
 
     rig   = line+
     line  = "joints" name x y z | "root" name | "hier" parent child
           | "skin" vertex (name weight)+
 
-Names are single words. Lines may be in any order; blank lines are ignored. Positions are those of
-the joints in the space of a mesh that is not in the file: y is up, and the unit is unknown. Weights
-belong to the vertices of that mesh, so they are not read; ``viewer rig --skeleton`` computes new
-ones for any mesh.
+    joints (J, 3)    or "J", "joint_positions": positions
+    parents (J,)     any order; a root has -1, None or its own index
+    bones (N, 2)     parent and child: instead of parents
+    names (J,)       or "joint_names"; optional
+
+Names in a text are single words. Lines may be in any order; blank lines are ignored. Positions are
+those of the joints in the space of a mesh: y is up, and the unit is unknown. Meshes in archives and
+weights are not read; ``viewer rig --skeleton`` computes new weights for any mesh.
 """
 
 from __future__ import annotations
@@ -22,15 +26,26 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
+from viewer.errors import FormatError
+from viewer.formats._archive.checking import archive_of, finite_array
+from viewer.formats._archive.opening import is_archive
+from viewer.formats._archive.values import Archive, texts_in
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST, to_number
 from viewer.phrases import counted, listed, printable, quoted
+from viewer.rigs.arrays import Ints
 from viewer.rigs.figure import Figure
+from viewer.rigs.hierarchy import cycle_members, depth_first
 from viewer.rigs.skeleton import ball_skeleton
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORDS = {b"joints": "a name and 3 numbers", b"root": "a name", b"hier": "a parent and a child"}
 _COUNTS = {b"joints": 5, b"root": 2, b"hier": 3}
+# Keys of an archive.
+_PLACES = ("J", "joints", "joint_positions")
+_NAMES = ("names", "joint_names")
+_HEAD = 64  # bytes by which an archive is recognised
+_UNSIGNED = float(2**32 - 1)
 
 
 @dataclass(slots=True)
@@ -50,6 +65,8 @@ class _Joints:
 
 def read(source: Source) -> Figure:
     """Read the joints as a skeleton of ball joints."""
+    if is_archive(source.peek(_HEAD)):
+        return _read_arrays(archive_of(source))
     found = _Joints()
     for start, words in _lines(source):
         _read_line(source, found, start, words)
@@ -93,6 +110,91 @@ def read(source: Source) -> Figure:
         )
     skeleton = ball_skeleton(names, np.array(parents, dtype=np.int32), places)
     return Figure(source.path.stem, skeleton=skeleton)
+
+
+def _read_arrays(archive: Archive) -> Figure:
+    """Read the joints of an archive."""
+    # Influences are called joints, too, but there are rarely three of each vertex.
+    key = next((key for key in _PLACES if archive.shape(key)[1:] == (3,)), None)
+    if key is None:
+        raise archive.source.fault(
+            "F002.predicted-joints: expected positions of joints (J, 3) as {expected}, found the "
+            "keys {found}",
+            expected=" or ".join(_PLACES),
+            found=listed([printable(key, 40) for key in archive.keys], 12),
+        )
+    places = finite_array(archive, key, (None, 3), "joints")
+    if len(places) == 0:
+        raise archive.fault("F002.no-rows: {item}: expected at least one row, found none", item=key)
+    places = np.nan_to_num(places)
+    parents = _parents(archive, len(places))
+    order = depth_first(parents)
+    rows = np.argsort(order)
+    above = np.where(parents >= 0, rows[parents], -1)[order]
+    names = _names(archive, len(places))
+    skeleton = ball_skeleton(tuple(names[joint] for joint in order), above, places[order])
+    return Figure(archive.source.path.stem, skeleton=skeleton)
+
+
+def _parents(archive: Archive, count: int) -> Ints:
+    """Return the parents (J,) of an archive's joints, in any order; -1 for roots."""
+    if archive.has("parents"):
+        key, children = "parents", np.arange(count)
+        given = archive.array(key, (count,)).values().astype(np.float64)
+    else:
+        key = "bones"
+        bones = archive.array(key, (None, 2), "iu").values()
+        given, children = bones[:, 0].astype(np.float64), bones[:, 1].astype(np.int64)
+        outside = np.flatnonzero((children < 0) | (children >= count))
+        if len(outside):
+            raise _no_joint(archive, key, count, float(children[outside[0]]))
+        several = np.flatnonzero(np.bincount(children, minlength=count) > 1)
+        if len(several):
+            raise archive.fault(
+                "F002.predicted-parents: {item}: expected one parent of joint {joint}, found "
+                "several",
+                item=key,
+                joint=int(several[0]),
+            )
+    # SMPL's root has -1 as an unsigned integer.
+    is_root = np.isnan(given) | (given == -1.0) | (given == children) | (given >= _UNSIGNED)
+    outside = np.flatnonzero(~is_root & ~((given >= 0) & (given < count) & (given % 1.0 == 0.0)))
+    if len(outside):
+        raise _no_joint(archive, key, count, float(given[outside[0]]))
+    parents = np.full(count, -1, dtype=np.int32)
+    parents[children] = np.where(is_root, -1.0, given)
+    circle = np.flatnonzero(cycle_members(parents))
+    if len(circle):
+        raise archive.fault(
+            "F002.predicted-circle: {item}: expected joints below a root, found joint {joint} "
+            "below itself",
+            item=key,
+            joint=int(circle[0]),
+        )
+    return parents
+
+
+def _no_joint(archive: Archive, key: str, count: int, found: float) -> FormatError:
+    return archive.fault(
+        "F002.predicted-joint: {item}: expected joints from 0 to {last}, found {found:g}",
+        item=key,
+        last=count - 1,
+        found=found,
+    )
+
+
+def _names(archive: Archive, count: int) -> list[str]:
+    """Return the names of an archive's joints, numbers where it has none."""
+    key = next((key for key in _NAMES if archive.has(key)), "")
+    names = texts_in(archive.objects(key)) if key else []
+    if names and len(names) != count:
+        raise archive.fault(
+            "F002.predicted-names: {item}: expected {expected}, found {found}",
+            item=key,
+            expected=counted(count, "name"),
+            found=len(names),
+        )
+    return names or [f"joint_{joint}" for joint in range(count)]
 
 
 def _lines(source: Source) -> Iterator[tuple[int, list[bytes]]]:
