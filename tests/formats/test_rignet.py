@@ -60,6 +60,27 @@ def test_joints_without_a_parent_are_further_roots():
     assert made.warnings == ["rig.txt:1: no parent for a: read as further roots"]
 
 
+def test_names_keep_their_spaces_and_comments_are_skipped():
+    made = source(
+        "# a network\n\njoints Bip01 L Thigh 0 0 0\njoints Bip01 1 0 0\n  # joints\n"
+        "joints Bip01 L 2 0 0\nroot Bip01\nhier Bip01 Bip01 L\nhier Bip01 L Bip01 L Thigh\n"
+    )
+    assert detect(made) == "rignet"
+    skeleton = read(made).skeleton
+    assert skeleton.names == ("Bip01", "Bip01 L", "Bip01 L Thigh") and not made.warnings
+    assert skeleton.parents.tolist() == [-1, 0, 1]
+
+
+def test_names_that_can_be_split_in_two_ways_are_refused():
+    names = "".join(f"joints {name} 0 0 0\n" for name in ("a", "a b", "b", "b b"))
+    with pytest.raises(FormatError) as caught:
+        read(source(names + "hier a b b\n"))
+    assert str(caught.value) == (
+        'rig.txt:5: expected a parent and a child, found "a b b", which can be split in several '
+        "ways"
+    )
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -211,7 +211,7 @@ FORMATS = {
     "rignet": Format(
         "predicted skeleton (RigNet)",
         (".txt", ".npz"),
-        rb"\Ajoints[ \t]+\S+[ \t]+[-+.\d]",
+        rb"\A\s*(?:#[^\n]*\n\s*)*joints[ \t]+\S",
         keys=("parents", "bones"),
         writes=False,
     ),

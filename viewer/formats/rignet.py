@@ -11,9 +11,10 @@ A text, or an archive of arrays::
     bones (N, 2)     parent and child: instead of parents
     names (J,)       or "joint_names"; optional
 
-Names in a text are single words. Lines may be in any order; blank lines are ignored. Positions are
-those of the joints in the space of a mesh: y is up, and the unit is unknown. Meshes in archives and
-weights are not read; ``viewer rig --skeleton`` computes new weights for any mesh.
+Names in a text are words; spaces in them are kept. Lines may be in any order; blank ones and
+comments (``#``) are ignored. Positions are those of the joints in the space of a mesh: y is up, and
+the unit is unknown. Meshes in archives and weights are not read; ``viewer rig --skeleton`` computes
+new weights for any mesh.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from viewer.rigs.skeleton import ball_skeleton
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORDS = {b"joints": "a name and 3 numbers", b"root": "a name", b"hier": "a parent and a child"}
-_COUNTS = {b"joints": 5, b"root": 2, b"hier": 3}
+_COUNTS = {b"joints": 5, b"root": 2, b"hier": 3}  # words, at least: names may have several
 # Keys of an archive.
 _PLACES = ("J", "joints", "joint_positions")
 _NAMES = ("names", "joint_names")
@@ -58,6 +59,8 @@ class _Joints:
     parents: dict[bytes, bytes] = field(default_factory=dict)
     links: dict[bytes, int] = field(default_factory=dict)
     """Offsets of the lines with the parents."""
+    pairs: list[tuple[list[bytes], int]] = field(default_factory=list)
+    """Words and offsets of the lines with a parent and a child."""
     root: tuple[bytes, int] | None = None
     n_weighted: int = 0
     """Number of vertices with weights."""
@@ -72,10 +75,8 @@ def read(source: Source) -> Figure:
         _read_line(source, found, start, words)
     if not found.places:
         raise source.fault("F002.rignet-empty: expected lines with joints, found none", source.end)
-    for child, parent in found.parents.items():
-        for name in (child, parent):
-            if name not in found.places:
-                raise _unknown(source, name, found.links[child])
+    for words, start in found.pairs:
+        _link(source, found, words, start)
     if found.root is not None:
         name, start = found.root
         if name not in found.places:
@@ -198,10 +199,10 @@ def _names(archive: Archive, count: int) -> list[str]:
 
 
 def _lines(source: Source) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the offset and words of each line that is not blank."""
+    """Yield the offset and words of each line that is not blank and no comment."""
     for line in _LINE.finditer(source.data):
         words = line.group().split()
-        if words:
+        if words and not words[0].startswith(b"#"):
             yield line.start() + line.group().index(words[0]), words
 
 
@@ -213,7 +214,7 @@ def _read_line(source: Source, found: _Joints, start: int, words: list[bytes]) -
     if word not in _COUNTS:
         source.warn(wording.UNKNOWN, start, found=quoted(word))
         return
-    if len(words) != _COUNTS[word]:
+    if len(words) < _COUNTS[word]:
         raise source.fault(
             wording.VALUE,
             start,
@@ -222,8 +223,8 @@ def _read_line(source: Source, found: _Joints, start: int, words: list[bytes]) -
             found=counted(len(rest), "word"),
         )
     if word == b"joints":
-        name, numbers = rest[0], []
-        for number in rest[1:]:
+        name, numbers = b" ".join(rest[:-3]), []
+        for number in rest[-3:]:
             value = to_number(number)
             if value is None or abs(value) > LARGEST:
                 raise source.fault(
@@ -242,25 +243,44 @@ def _read_line(source: Source, found: _Joints, start: int, words: list[bytes]) -
             )
         found.places[name], found.starts[name] = numbers, start
     elif word == b"root":
-        if found.root is not None and found.root[0] != rest[0]:
+        name = b" ".join(rest)
+        if found.root is not None and found.root[0] != name:
             raise source.fault(
                 "F002.rignet-root: expected one root, found {first} and {second}",
                 start,
                 first=quoted(found.root[0]),
-                second=quoted(rest[0]),
+                second=quoted(name),
             )
-        found.root = rest[0], start
+        found.root = name, start
     else:
-        parent, child = rest
-        if found.parents.get(child, parent) != parent:
-            raise source.fault(
-                "F002.rignet-parents: expected one parent of {child}, found {first} and {second}",
-                start,
-                child=quoted(child),
-                first=quoted(found.parents[child]),
-                second=quoted(parent),
-            )
-        found.parents[child], found.links[child] = parent, start
+        found.pairs.append((rest, start))
+
+
+def _link(source: Source, found: _Joints, words: list[bytes], start: int) -> None:
+    """Add the parent and child of a line; names of several words are those of joints."""
+    ways = [(b" ".join(words[:at]), b" ".join(words[at:])) for at in range(1, len(words))]
+    known = [way for way in ways if found.places.keys() >= {*way}]
+    if not known:
+        # Of two words, one is wrong; of more, the last one is as good as any.
+        parent, child = ways[-1]
+        raise _unknown(source, child if parent in found.places else parent, start)
+    if len(known) > 1:
+        raise source.fault(
+            "F002.rignet-names: expected a parent and a child, found {names}, which can be split "
+            "in several ways",
+            start,
+            names=quoted(b" ".join(words)),
+        )
+    parent, child = known[0]
+    if found.parents.get(child, parent) != parent:
+        raise source.fault(
+            "F002.rignet-parents: expected one parent of {child}, found {first} and {second}",
+            start,
+            child=quoted(child),
+            first=quoted(found.parents[child]),
+            second=quoted(parent),
+        )
+    found.parents[child], found.links[child] = parent, start
 
 
 def _ordered(source: Source, found: _Joints) -> list[bytes]:
