@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rendering.drawn_figures import random_figure, random_pose
 
 import viewer
 from viewer.cli import run
@@ -19,7 +20,13 @@ from viewer.errors import PluginError
 from viewer.exporters import EXPORTERS, usable_exporters
 from viewer.formats import FORMATS, all_suffixes
 from viewer.plugins import _installed, plugins_of, without_plugins
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
+from viewer.rendering.gpu.program import Programs
 from viewer.rigs import scalars
+from viewer.rigs.inspection.explanation import explain, explanation_text
+from viewer.rigs.kinematics import posed_skeleton
+from viewer.rigs.skinning import METHODS, Skinning
 
 TRIANGLE = "OFF\n3 1 3\n0 0 0\n1 0 0\n0 2 0\n3 0 1 2\n"
 
@@ -27,7 +34,7 @@ TRIANGLE = "OFF\n3 1 3\n0 0 0\n1 0 0\n0 2 0\n3 0 1 2\n"
 @pytest.fixture
 def install(tmp_path, monkeypatch):
     """Return a function that installs a package: a folder with its metadata counts as that."""
-    tables, place = (scalars.SCALARS, EXPORTERS, CODES), tmp_path / "site"
+    tables, place = (scalars.SCALARS, EXPORTERS, CODES, METHODS), tmp_path / "site"
     known = [dict(table) for table in tables]
     place.mkdir()
     monkeypatch.syspath_prepend(place)
@@ -498,3 +505,106 @@ def test_existing_folders_are_kept(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine").mkdir()
     assert run(["new-plugin", "other", "-o", "mine"]) == 2
     assert "mine: exists; expected a new folder" in capsys.readouterr().err
+
+
+MANUAL = Path(viewer.__file__).parent / "manual" / "plugins.md"
+
+
+def strongest_method():
+    """The skinning method of the manual, whose code is run as it is printed."""
+    return re.search(r"```python\n(.*?)```", MANUAL.read_text("utf-8"), re.DOTALL)[1]
+
+
+def add_method(install, text, name="strongest"):
+    (install("viewer-skinning", [("skinning", name, "own_method")]) / "own_method.py").write_text(
+        text
+    )
+
+
+def test_skinning_method_of_the_manual_deforms_and_draws_alike(install, ctx):
+    add_method(install, strongest_method())
+    assert "own_method" not in sys.modules
+    figure = random_figure(np.random.default_rng(0), 7, n_vertices=300)
+    pose = random_pose(figure.skeleton, np.random.default_rng(1))
+    how = Skinning("strongest")
+    found, normals = viewer.deform(figure, pose, how)
+    skin, palette = figure.skin, posed_skeleton(figure.skeleton, pose).palette(figure.skin)
+    for vertex, place in enumerate(figure.mesh.positions):
+        ties = range(skin.starts[vertex], skin.starts[vertex + 1])
+        if ties:
+            strongest = skin.joints[max(ties, key=lambda tie: skin.weights[tie])]
+            place = (palette[strongest] @ [*place, 1.0])[:3]
+        np.testing.assert_allclose(found[vertex], place, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    programs = Programs(ctx)
+    posed = PosedMesh(ctx, programs, MeshBuffers(ctx, figure, []))
+    posed.update(pose, how)
+    drawn, drawn_normals = posed.read()
+    size = np.ptp(figure.mesh.positions, axis=0).max()
+    np.testing.assert_allclose(drawn, found, rtol=0, atol=1e-5 * size)
+    np.testing.assert_allclose(drawn_normals, normals, rtol=0, atol=1e-5)
+    told = explanation_text(explain(figure, pose, how, 5))
+    assert told[0] == "vertex 5: Strongest joint only"
+    assert any(line.startswith("strongest joint") for line in told)
+    for owner in (posed, posed.mesh, programs):
+        owner.release()
+
+
+def test_skinning_method_of_a_plugin_is_one_of_all(install, tmp_path):
+    add_method(install, strongest_method())
+    picture, page = tmp_path / "a.png", tmp_path / "a.html"
+    assert run(["render", "--method", "strongest", "--size", "64x64", "-o", str(picture)]) == 0
+    assert run(["convert", "fox", "--method", "strongest", "-o", str(page)]) == 0
+    assert "influence(in_bindings.x).x" in page.read_text("utf-8")
+    assert [each.found for each in examine() if each.subject == "plug-in"] == [
+        "viewer-skinning 0.1: skinning strongest"
+    ]
+    with without_plugins():
+        assert run(["render", "--method", "strongest", "-o", str(picture)]) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            ("METHOD = Method(", "METHOD = (lambda *a, **b: a)("),
+            "expected METHOD to be a Method without ends",
+        ),
+        (('SHADER = """', 'SHADER = b"""'), "expected SHADER to be a text, found bytes"),
+        (("SHADER =", "TEXT ="), "expected a module with SHADER, found none"),
+        (("return moved,", "return moved[1:],"), "expected finite positions of shape"),
+        (("return moved,", "return moved * np.nan,"), "from deform, found others"),
+        (("return moved,", "return 1 / 0,"), "cannot deform: ZeroDivisionError"),
+        (("position = vec3(", "position = oops("), "the driver rejected a shader (skin/rejected"),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_error_of_a_skinning_method_names_its_package(changes, message, install, tmp_path, capsys):
+    # A program is compiled once for each name, in all tests.
+    name = "rejected" if "oops" in changes[1] else "broken"
+    add_method(install, strongest_method().replace(*changes), name)
+    picture = tmp_path / "a.png"
+    options = ["--method", name, "--size", "64x64", "-o", str(picture)]
+    assert run(["render", "--scalar", "stretch", *options]) == 2
+    error = capsys.readouterr().err
+    assert f"plug-in viewer-skinning 0.1 (skinning {name}): " in error
+    assert message in error
+    assert "Traceback" not in error
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("group", "text", "message"),
+    [
+        ("scalars", "", "expected a Scalar, found module"),
+        ("exporters", "EXPORTER = export = 3", "expected EXPORTER to be an Exporter"),
+        ("checks", "CODES = {'X1': 2}\ndef check(subject): ...", "expected a Code with a severity"),
+        ("skinning", "METHOD = SHADER = deform = 3", "expected METHOD to be a Method"),
+    ],
+)
+def test_doctor_finds_rows_that_their_registry_refuses(group, text, message, install):
+    place = install("viewer-wrong", [(group, "strange", "strange_row")])
+    (place / "strange_row.py").write_text(text)
+    (found,) = (each for each in examine() if each.subject == "plug-in")
+    assert found.state == "missing"
+    assert found.found.startswith(f"plug-in viewer-wrong 0.1 ({group} strange): {message}")

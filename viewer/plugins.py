@@ -27,7 +27,7 @@ from viewer.errors import PluginError, ViewerError
 from viewer.phrases import printable
 
 Group: TypeAlias = Literal[
-    "formats", "exporters", "scalars", "checks", "commands", "panels", "tools"
+    "formats", "exporters", "scalars", "checks", "skinning", "commands", "panels", "tools"
 ]
 
 GROUPS: tuple[Group, ...] = get_args(Group)
@@ -37,6 +37,7 @@ _PARTS: dict[Group, tuple[str, ...]] = {
     "exporters": ("EXPORTER", "export"),
     "scalars": (),
     "checks": ("CODES", "check"),
+    "skinning": ("METHOD", "SHADER", "deform"),
     "commands": ("add_arguments", "run"),
     "panels": ("draw",),
     "tools": ("recognises", "read"),

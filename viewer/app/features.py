@@ -18,7 +18,7 @@ from viewer.app.core.reasons import (
     no_parts,
     no_skeleton,
 )
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import key_name
 from viewer.app.files.files import ask_for_files, open_bundled_body, open_bundled_figure
@@ -66,7 +66,7 @@ from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN, Shading
 from viewer.rigs.motion.animation_choice import animation_labels
 from viewer.rigs.skeleton import joint_labels, shown_joints
-from viewer.rigs.skinning import METHODS
+from viewer.rigs.skinning import METHODS, unused_methods
 
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key
@@ -221,6 +221,9 @@ def _choices(state: AppState) -> Iterator[Entry]:
         )
     for name, method in METHODS.items():
         yield Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
+    for plugin in unused_methods():
+        title = f"{plugin.name} ({plugin.distribution})"
+        yield Entry(f"Skinning: {title}", "choice", partial(_skin, name=plugin.name))
 
 
 def _shade(state: AppState, name: Shading) -> None:
@@ -228,6 +231,7 @@ def _shade(state: AppState, name: Shading) -> None:
     state.say_status(SHADING[name])
 
 
+@shows_errors
 def _skin(state: AppState, name: str) -> None:
     state.options.skinning.method = name
     state.say_status(METHODS[name].title)

@@ -24,7 +24,7 @@ from viewer.commands._printing import print_line
 from viewer.data_classes import dataclass
 from viewer.errors import PluginError, RenderError
 from viewer.phrases import counted, printable
-from viewer.plugins import GROUPS, Group, installed_plugins, plugin_of
+from viewer.plugins import GROUPS, Group, Plugin, installed_plugins, plugin_of
 
 if TYPE_CHECKING:
     from viewer.rendering.offscreen import Offscreen
@@ -152,9 +152,32 @@ def _examine_plugins() -> Iterator[_Finding]:
         if plugin.name in _own_keys(plugin.group):
             yield _Finding("plug-in", "note", f"{unused}: this program has its own")
             continue
+        try:
+            _use(plugin)
+        except PluginError as problem:
+            yield _Finding("plug-in", "missing", str(problem))
+            continue
         found.setdefault(plugin.distribution, []).append(f"{plugin.group} {plugin.name}")
     for package, rows in found.items():
         yield _Finding("plug-in", "ok", f"{package}: {', '.join(rows)}")
+
+
+def _use(plugin: Plugin) -> None:
+    """Let the registry check what a plug-in adds to it."""
+    from viewer.exporters import exporters_at
+    from viewer.linting import plugged_check
+    from viewer.rigs.scalars import find_quantity
+    from viewer.rigs.skinning import Skinning
+
+    match plugin.group:
+        case "exporters":
+            exporters_at(f"file.{plugin.name}")
+        case "scalars":
+            find_quantity(plugin.name)
+        case "checks":
+            plugged_check(plugin)
+        case "skinning":
+            Skinning(plugin.name)
 
 
 def _own_keys(group: Group) -> Collection[str]:
@@ -164,6 +187,7 @@ def _own_keys(group: Group) -> Collection[str]:
     from viewer.formats.video_mocap.tools import TOOLS
     from viewer.linting import CHECKS
     from viewer.rigs.scalars import SCALARS
+    from viewer.rigs.skinning import METHODS
 
     if group == "panels":
         from viewer.app.layout import PANELS
@@ -175,6 +199,7 @@ def _own_keys(group: Group) -> Collection[str]:
         "exporters": {suffix[1:] for suffixes in written for suffix in suffixes},
         "scalars": SCALARS,
         "checks": CHECKS,
+        "skinning": [key for key, method in METHODS.items() if method.plugin is None],
         "commands": COMMANDS,
         "tools": TOOLS,
     }

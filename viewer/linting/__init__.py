@@ -8,7 +8,7 @@ from viewer.linting._files import Recheck, lint_files, recheck
 from viewer.linting._finding import MAX_ROTATION, Finding, LintOptions
 from viewer.linting._places import Places, places_of, points_of
 from viewer.linting._report import describe, finding_text, summary, worst_first
-from viewer.linting._running import CHECKS, Check, lint_scene, used_checks
+from viewer.linting._running import CHECKS, Check, lint_scene, plugged_check, used_checks
 from viewer.linting._subject import Subject
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "lint_files",
     "lint_scene",
     "places_of",
+    "plugged_check",
     "points_of",
     "recheck",
     "summary",

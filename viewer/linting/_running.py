@@ -15,7 +15,7 @@ from viewer.errors import FormatError
 from viewer.linting._finding import Finding, LintOptions
 from viewer.linting._subject import Subject, counting_of
 from viewer.phrases import listed
-from viewer.plugins import added_to, plugin_of
+from viewer.plugins import Plugin, added_to, plugin_of
 from viewer.progress import report
 from viewer.rigs.arrays import Ints
 from viewer.rigs.motion.animation_choice import play_animation
@@ -70,21 +70,27 @@ def used_checks() -> dict[str, Check]:
     """Return all rows, with those of plug-ins, whose codes are then known."""
     found = dict(CHECKS)
     for plugin in added_to("checks", CHECKS):
-        module = plugin.load()
-        found[plugin.name] = getattr(module, "CHECK", Check(plugin.name))
-        if not isinstance(found[plugin.name], Check):
-            raise plugin.error(f"expected CHECK to be a Check, found {found[plugin.name]!r:.80}")
-        if not isinstance(module.CODES, dict):
-            raise plugin.error(f"expected CODES to be a dict, found {module.CODES!r:.80}")
-        for name, code in module.CODES.items():
-            if not isinstance(code, Code) or code.severity not in SEVERITIES:
-                wanted = f"expected a Code with a severity of {', '.join(SEVERITIES)}"
-                raise plugin.error(f"{wanted} for {name!r:.40}, found {code!r:.80}")
-            if not (_PLUGGED_CODE.fullmatch(str(name)) and CODES.setdefault(name, code) == code):
-                raise plugin.error(
-                    'expected codes of "P" and other capitals or digits, which no other plug-in '
-                    f"has, found {name!r:.40}"
-                )
+        found[plugin.name] = plugged_check(plugin)
+    return found
+
+
+def plugged_check(plugin: Plugin) -> Check:
+    """Return the row of a plug-in, whose codes are then known."""
+    module = plugin.load()
+    found = getattr(module, "CHECK", Check(plugin.name))
+    if not isinstance(found, Check):
+        raise plugin.error(f"expected CHECK to be a Check, found {found!r:.80}")
+    if not isinstance(module.CODES, dict):
+        raise plugin.error(f"expected CODES to be a dict, found {module.CODES!r:.80}")
+    for name, code in module.CODES.items():
+        if not isinstance(code, Code) or code.severity not in SEVERITIES:
+            wanted = f"expected a Code with a severity of {', '.join(SEVERITIES)}"
+            raise plugin.error(f"{wanted} for {name!r:.40}, found {code!r:.80}")
+        if not (_PLUGGED_CODE.fullmatch(str(name)) and CODES.setdefault(name, code) == code):
+            raise plugin.error(
+                'expected codes of "P" and other capitals or digits, which no other plug-in '
+                f"has, found {name!r:.40}"
+            )
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from viewer.resources import resource
+from viewer.rigs.skinning import plugged_shader
 
 STORAGE_VERSION = 430
 """Version of OpenGL with storage buffers and compute shaders; crowds are drawn with them."""
@@ -67,7 +68,9 @@ def _included(name: str, files: list[str]) -> str:
 
 def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     """Return a chunk's text after required chunks, whose functions get their name as a suffix."""
-    inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
+    inner = plugged_shader(chunk) if folder == "skin" else None
+    if inner is None:
+        inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
     parts = [_included(name, files) for name in _INCLUDES.findall(inner)]
     for name in needs[1].split() if needs else []:

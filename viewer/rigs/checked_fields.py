@@ -12,7 +12,7 @@ import builtins
 import math
 import operator
 import sys
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from dataclasses import Field, fields
 from numbers import Integral, Real
 from types import NoneType, UnionType
@@ -128,7 +128,7 @@ def _rule(cls: type, field: Field[Any]) -> _Rule | None:
     choices, limits = field.metadata.get("choices"), field.metadata.get("limits")
     shape = field.metadata.get("shape")
     if choices is not None:
-        kind = _one_of((*choices, None) if "None" in text else tuple(choices))
+        kind = _one_of((*choices, None) if "None" in text else choices)
     if shape is not None:
         kind = _either([_array(shape), _NOTHING]) if "None" in text else _array(shape)
     if kind is _ANYTHING:
@@ -208,13 +208,12 @@ def _either(kinds: Sequence[_Kind]) -> _Kind:
     return _Kind(text, lambda value: any(kind.fits(value) for kind in kinds), convert, exact)
 
 
-def _one_of(choices: tuple[Any, ...]) -> _Kind:
+def _one_of(choices: Collection[Any]) -> _Kind:
     """Return the kind of a value that is one of a few texts, or None."""
-    texts = [each for each in choices if isinstance(each, str)]
 
     def convert(name: str, value: Any) -> object:
         if value not in choices:
-            hint = name_hint(value, texts)
+            hint = name_hint(value, [each for each in choices if isinstance(each, str)])
             raise RigError(f'{name}: no value "{printable(value, 60)}"; {hint}')
         return value
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.core.state import AppState
+from viewer.app.core.state import AppState, shows_errors
 from viewer.app.core.widgets import (
     checkbox,
     count_slider,
@@ -16,7 +16,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.files.files import offer_files
 from viewer.rigs.scalars import strongest
-from viewer.rigs.skinning import METHODS
+from viewer.rigs.skinning import METHODS, unused_methods
 
 _CLAMP = int(imgui.SliderFlags_.always_clamp)
 _ENGINE = 4  # influences per vertex in most game engines
@@ -39,6 +39,10 @@ def draw(state: AppState) -> None:
         note_item(state, method.short)
         if imgui.is_item_hovered():
             imgui.set_tooltip(method.title)
+    for plugin in unused_methods():
+        if imgui.radio_button(f"{plugin.name} ({plugin.distribution})", False):
+            _use_plugin(state, plugin.name)
+        note_item(state, plugin.name)
     for key, method in METHODS.items():
         if not method.ends:
             continue
@@ -74,3 +78,9 @@ def draw(state: AppState) -> None:
     draw_setting(state, "Normalise weights", skinning, "normalize", why=why)
     if figure.correctives is not None:
         draw_setting(state, "Pose correctives", skinning, "correctives")
+
+
+@shows_errors
+def _use_plugin(state: AppState, name: str) -> None:
+    """Use a plug-in's method, whose module is now imported."""
+    state.options.skinning.method = name

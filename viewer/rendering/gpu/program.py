@@ -11,6 +11,7 @@ from viewer.errors import RenderError
 from viewer.interrupts import deferred
 from viewer.rendering.options import Shading
 from viewer.rendering.shader_text import LINES_PER_FILE, compose
+from viewer.rigs.skinning import METHODS
 
 SHADING: dict[Shading, str] = {
     "phong": "Blinn-Phong, two lights",
@@ -119,7 +120,8 @@ class Programs:
                 with deferred():
                     self._computed[name] = self.context.compute_shader(text)
             except moderngl.Error as problem:
-                raise RenderError(self._explain(str(problem), files)) from None
+                text = self._explain(str(problem), files)
+                raise RenderError(f"{text}: please report this") from None
         return self._computed[name]
 
     def _get(
@@ -153,7 +155,11 @@ class Programs:
                         varyings=outputs,
                     )
             except moderngl.Error as problem:
-                raise RenderError(self._explain(str(problem), files)) from None
+                text = self._explain(str(problem), files)
+                plugin = METHODS[skin].plugin if skin else None
+                if plugin is not None:
+                    raise plugin.error(text) from None
+                raise RenderError(f"{text}: please report this") from None
         return self._cache[key]
 
     def _explain(self, text: str, files: list[str]) -> str:
@@ -168,8 +174,7 @@ class Programs:
         shown = " / ".join(lines) or " ".join(text.split())
         info = self.context.info
         return (
-            f"the driver rejected a shader ({shown}) on {info['GL_RENDERER']}, "
-            f"{info['GL_VERSION']}: please report this"
+            f"the driver rejected a shader ({shown}) on {info['GL_RENDERER']}, {info['GL_VERSION']}"
         )
 
     def release(self) -> None:

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from types import NoneType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
+from viewer.plugins import Plugin, added_to, plugin_of
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.checked_fields import checked
 from viewer.rigs.figure import Figure
@@ -47,25 +48,55 @@ class Method:
     result: str = ""
     """Label of the result in the explanation of a vertex; empty if the last sum is already the
     result. ``{blend_factor}`` is replaced by the number."""
+    plugin: Plugin | None = None
+    """The plug-in that has added the method."""
 
 
-METHODS = {
-    "lbs": Method("Linear blend (LBS)", "LBS"),
-    "dqs": Method("Dual quaternion (DQS)", "DQS", uses_matrices=False, uses_quaternions=True),
-    "mix": Method(
-        "Between LBS and DQS",
-        "Mixed",
-        uses_quaternions=True,
-        ends=("lbs", "dqs"),
-        result="{blend_factor} of the way",
-    ),
-}
+class _Methods(dict[str, Method]):
+    """Methods by name; looking for one of a plug-in imports its module and adds its row."""
+
+    def __contains__(self, name: object) -> bool:
+        is_known = super().__contains__(name)
+        if not isinstance(name, str) or (is_known and self[name].plugin is None):
+            return is_known
+        plugin = plugin_of("skinning", name)
+        if plugin is None:
+            return False  # also if plug-ins have been switched off since it was used
+        if not is_known:
+            self[name] = _plugged_method(plugin)
+        return True
+
+
+def _plugged_method(plugin: Plugin) -> Method:
+    """Return the row of a plug-in's method."""
+    module = plugin.load()
+    if not isinstance(module.METHOD, Method) or module.METHOD.ends:
+        raise plugin.error("expected METHOD to be a Method without ends")
+    if not isinstance(module.SHADER, str):
+        raise plugin.error(f"expected SHADER to be a text, found {type(module.SHADER).__name__}")
+    return replace(module.METHOD, plugin=plugin)
+
+
+METHODS = _Methods(
+    {
+        "lbs": Method("Linear blend (LBS)", "LBS"),
+        "dqs": Method("Dual quaternion (DQS)", "DQS", uses_matrices=False, uses_quaternions=True),
+        "mix": Method(
+            "Between LBS and DQS",
+            "Mixed",
+            uses_quaternions=True,
+            ends=("lbs", "dqs"),
+            result="{blend_factor} of the way",
+        ),
+    }
+)
 """Modules in this folder, each with a GLSL chunk in ``shaders/skin`` and a function
 ``deform(positions, normals, skin, palette, blend_factor)``.
 
 It transforms positions and normals (V, 3) of the bind pose by skinning matrices (J, 4, 4), bind to
 posed, which may scale and shear, and returns both (V, 3) in figure units, normals of unit length. A
-vertex without influence stays at its bind position. Weights are used as stored."""
+vertex without influence stays at its bind position. Weights are used as stored. Those of plug-ins
+are added when they are first looked for."""
 PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 """Methods that are not interpolated between others; the first is the reference."""
 
@@ -185,10 +216,38 @@ def skinned(
     used, normals = skin_used(skin, skinning), mesh.normals
     if vertices is not None:
         used, normals = skin_rows(used, vertices), normals[vertices]
+    plugin, factor = METHODS[skinning.method].plugin, skinning.blend_factor
+    if plugin is not None:
+        return _plugged_deform(plugin, rest, normals, used, palette, factor)
     module = import_module(f"{__name__}.{skinning.method}")
-    factor = skinning.blend_factor
     moved: tuple[Floats, Floats] = module.deform(rest, normals, used, palette, factor)
     return moved
+
+
+def _plugged_deform(plugin: Plugin, rest: Floats, *inputs: Any) -> tuple[Floats, Floats]:
+    """Return what a plug-in's ``deform`` returns, which is checked."""
+    with plugin.guarded("cannot deform"):
+        # Copies: its inputs are kept, and may be shared with other figures.
+        moved, normals = plugin.load().deform(rest.copy(), *inputs)
+        found = np.array(moved, np.float64), np.array(normals, np.float64)
+    for name, values in zip(("positions", "normals"), found, strict=True):
+        if values.shape != rest.shape or not np.isfinite(values).all():
+            raise plugin.error(
+                f"expected finite {name} of shape {rest.shape} from deform, found "
+                f"{'others' if values.shape == rest.shape else f'shape {values.shape}'}"
+            )
+    return found
+
+
+def unused_methods() -> tuple[Plugin, ...]:
+    """Return the plug-ins whose methods have not been used, for menus."""
+    return added_to("skinning", [*METHODS])
+
+
+def plugged_shader(method: str) -> str | None:
+    """Return the GLSL chunk of a plug-in's method; None for one of this program."""
+    plugin = METHODS[method].plugin
+    return None if plugin is None else str(plugin.load().SHADER)
 
 
 def deform_frames(
