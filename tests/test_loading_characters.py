@@ -211,6 +211,52 @@ def character_of(table: str) -> File:
     return file
 
 
+RIGGED = """
+pelvis 0 2 0
+ spine1 0 0.4 0
+  left_shoulder 0.4 0.5 0
+   left_elbow 0.6 0 0
+    left_wrist 0.5 0 0
+  right_shoulder -0.4 0.5 0
+   right_elbow -0.6 0 0
+    right_wrist -0.5 0 0
+ left_hip 0.2 0 0
+  left_knee 0 -1 0
+   left_ankle 0 -0.8 0
+ right_hip -0.2 0 0
+  right_knee 0 -1 0
+   right_ankle 0 -0.8 0
+"""
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
+    amass, is_named, tmp_path
+):
+    """Such joints have figures rigged by default, whatever their size and origin are."""
+    hero = tmp_path / "hero.glb"
+    hero.write_bytes(character_of(RIGGED).glb())
+    settings = MotionSettings(model=hero if is_named else None, feet=False)
+    (found,) = load(*([amass] if is_named else [amass, hero]), motion=settings).actors
+    (plain,) = load(amass).actors
+    paths, legs = [], []
+    for actor in (plain, found):
+        names = actor.figure.skeleton.names
+        leg = [names.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
+        places = []
+        for time in (0.0, 4 / 30):
+            pose_actors([actor], time)
+            matrices = actor.placement @ viewer.joint_matrices(actor.figure, actor.pose)
+            places.append(matrices[:, :3, 3])
+        legs.append(np.linalg.norm(np.diff(places[0][leg], axis=0), axis=1).sum())
+        paths.append(places[1][names.index("pelvis")] - places[0][names.index("pelvis")])
+    assert_allclose(legs[1], 1.8, rtol=1e-6)
+    # The file moves by 1 m along -y of a world with z up.
+    assert_allclose(paths[0], [0, -1, 0], rtol=0, atol=1e-9)
+    forward = [0, -1, 0] if is_named else [0, 0, 1]  # the up axis of the scene
+    assert_allclose(paths[1], legs[1] / legs[0] * np.array(forward), rtol=0, atol=1e-3)
+
+
 @pytest.mark.parametrize("is_named", [False, True])
 def test_fingers_of_smplh_drive_those_of_a_character(is_named, tmp_path):
     """The bundled body has no fingers, so they used to stay at rest."""

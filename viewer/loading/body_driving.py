@@ -14,14 +14,6 @@ from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.joint_map import JointMap
 
-_ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
-
-
-def has_joints(figure: Figure, names: Sequence[str]) -> bool:
-    """Return whether a figure has the root and most of the joints of a body model."""
-    own = set(figure.require_skeleton().names)
-    return names[0] in own and sum(name in own for name in names) >= _ENOUGH * len(names)
-
 
 def with_joints(body: Figure, names: Sequence[str]) -> Figure:
     """Return a body without its mesh that has all joints of a motion, to drive other figures."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
@@ -11,7 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import Source, read
-from viewer.loading.body_driving import has_joints
 from viewer.loading.contents import read_files
 from viewer.loading.pairing import joined_figures
 from viewer.loading.scene_draft import SceneDraft
@@ -26,11 +24,14 @@ _HIP = "left_hip"
 
 
 def is_body(figure: Figure) -> bool:
-    """Return whether a figure can show captured bodies: it has the family's root and a mesh."""
-    # A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
-    # root of Unreal's characters and of animals has the family's name, too, but their legs do not.
+    """Return whether a figure can show captured bodies: it has the family's root and shapes."""
+    # A character with the same joint names cannot, whether it is a VRM file or was rigged from the
+    # bundled body: its size, rest pose and origin differ. The root of Unreal's characters and of
+    # animals has the family's name, too, but their legs do not.
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
+        return False
+    if figure.blend_shapes is None or "shape" not in figure.blend_shapes.groups:
         return False
     root = skeleton.names[0]
     return root in _ROOTS and (root != _ROOTS[0] or _HIP in skeleton.names)
@@ -78,14 +79,12 @@ class BodyModels:
             self.draft.used_options.add("gender")
         return replace(space, gender=self.settings.gender or space.gender)
 
-    def choose(self, path: Path, space: ShapeSpace, joint_names: Sequence[str] = ()) -> Choice:
-        """Return the figure for a body; ``joint_names`` of its motion begin with the root."""
+    def choose(self, path: Path, space: ShapeSpace) -> Choice:
+        """Return the figure for a body."""
         space, has_parameters = self.wanted(space), space.model == "MHR"
         named = self.named(space.gender)
         if named is not None:
-            own = bool(joint_names) and has_joints(named, joint_names)
-            is_family = is_body(named) or (own and named.require_skeleton().humanoid is None)
-            if is_family or (named.parameters is not None and has_parameters):
+            if is_body(named) or (named.parameters is not None and has_parameters):
                 return Choice(named, "named")
             # Bodies given by parameters drive another figure via the model of the parameters.
             carrier: Figure | None = None

@@ -123,7 +123,7 @@ def _give_body_motion(
     path: Path, motion: BodyMotion, draft: SceneDraft, models: BodyModels
 ) -> None:
     settings, space = models.settings, motion.shape_space
-    choice = models.choose(path, space, motion.joint_names)
+    choice = models.choose(path, space)
     draft.diagnostics += choice.notes
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
