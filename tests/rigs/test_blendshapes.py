@@ -60,7 +60,7 @@ def test_blend_shapes_belong_to_the_shape_group_by_default():
         ({"offsets": OFFSETS[0]}, "offsets: expected shape 3 x any x 3, found 2 x 3"),
         (
             {"offsets": Deferred((2, 2, 3), "f8", lambda: OFFSETS)},
-            "offsets: expected shape (3, 2, 3), found (2, 2, 3)",
+            "offsets: expected shape 3 x any x 3, found 2 x 2 x 3",
         ),
     ],
 )
@@ -303,7 +303,7 @@ def test_normal_offsets_may_be_read_lazily():
 def test_normal_offsets_with_a_different_array_shape_are_refused():
     with pytest.raises(RigError) as caught:
         BlendShapes(("a",), np.zeros((1, 3, 3)), (), np.zeros((1, 2, 3)))
-    assert str(caught.value) == "normal_offsets: expected shape (1, 3, 3), found (1, 2, 3)"
+    assert str(caught.value) == "normal_offsets: expected shape 1 x 3 x 3, found 1 x 2 x 3"
 
 
 def test_recorded_pose_restores_morph_weights():

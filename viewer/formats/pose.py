@@ -54,7 +54,7 @@ from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import axes, listed, optional, printable, quoted
-from viewer.rigs.arrays import Deferred, Floats
+from viewer.rigs.arrays import Deferred, Floats, deferred
 from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import Up
@@ -482,7 +482,7 @@ class _NamedValues:
 def _described(value: Any) -> Phrase:
     """Return a description of a value for messages: an array by its shape and type."""
     is_array = isinstance(value, np.ndarray)
-    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
+    return describe(deferred(value) if is_array else value)
 
 
 def _odd_value(value: object, kinds: str) -> tuple[tuple[int, ...] | None, object]:

@@ -42,6 +42,9 @@ class Deferred:
 
     __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
 
+    is_sparse = False
+    """Whether the array is expected to be mostly zero, and stored without the zeros."""
+
     def __init__(
         self,
         shape: tuple[int, ...],
@@ -75,6 +78,25 @@ class Deferred:
         for start in range(0, len(values), count):
             yield values[start : start + count]
 
+    def check(self) -> None:
+        """Read the array; raises ``FormatError`` if it is damaged."""
+        self.values()
+
+    def columns(self, indices: Ints) -> Floats:
+        """Return some columns of all rows, such as the offsets (P, N, 3) of N vertices."""
+        return self.values()[:, indices].astype(np.float64, copy=False)
+
+    def total(self, weights: Floats) -> Floats | None:
+        """Return the sum of the rows times their weights; None if it needs ``values``."""
+        return None
+
+
+def deferred(values: NDArray[Any] | Deferred) -> Deferred:
+    """Return an array, read-only once it is used, as one that is read on first use."""
+    if isinstance(values, Deferred):
+        return values
+    return Deferred(values.shape, values.dtype, lambda: values)
+
 
 def frozen(
     name: str, values: object, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64
@@ -85,13 +107,7 @@ def frozen(
     number is not finite, or an integer type is required and a value has a fraction.
     """
     array = _converted(name, values, np.dtype(dtype))
-    fits = array.ndim == len(shape) and all(
-        wanted is None or wanted == found for wanted, found in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
-        wanted_text = " x ".join("any" if wanted is None else str(wanted) for wanted in shape)
-        found_text = " x ".join(map(str, array.shape)) or "a single number"
-        raise RigError(f"{name}: expected shape {wanted_text}, found {found_text}")
+    require_shape(name, array.shape, shape)
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise RigError(f"{name}: expected finite numbers, found {_first_not_finite(array)}")
     if (array is values or array.base is not None) and _is_writeable_by_others(array):
@@ -100,12 +116,29 @@ def frozen(
     return array
 
 
+def require_shape(name: str, found: tuple[int, ...], shape: tuple[int | None, ...]) -> None:
+    """Raise ``RigError`` if a shape is not as expected; ``None`` allows any length of an axis."""
+    if len(found) != len(shape) or any(
+        wanted not in (None, size) for size, wanted in zip(found, shape, strict=True)
+    ):
+        wanted_text = " x ".join("any" if wanted is None else str(wanted) for wanted in shape)
+        found_text = " x ".join(map(str, found)) or "a single number"
+        raise RigError(f"{name}: expected shape {wanted_text}, found {found_text}")
+
+
 def freeze_fields(
     owner: object, dtype: DTypeLike = np.float64, /, **shapes: tuple[int | None, ...]
 ) -> None:
-    """Pass fields of a frozen dataclass through ``frozen``, each with its shape, in this order."""
+    """Pass fields of a frozen dataclass through ``frozen``, each with its shape, in this order.
+
+    Of an array that is read on first use, only the shape is checked.
+    """
     for name, shape in shapes.items():
-        object.__setattr__(owner, name, frozen(name, getattr(owner, name), shape, dtype))
+        values = getattr(owner, name)
+        if isinstance(values, Deferred):
+            require_shape(name, values.shape, shape)
+        else:
+            object.__setattr__(owner, name, frozen(name, values, shape, dtype))
 
 
 def freeze(array: NDArray[Item]) -> NDArray[Item]:

@@ -8,8 +8,17 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Bools, Deferred, Floats, Ints, freeze_fields, frozen, runs_of
-from viewer.rigs.bodies.offsets import DeferredOffsets, SparseOffsets
+from viewer.rigs.arrays import (
+    Bools,
+    Deferred,
+    Floats,
+    Ints,
+    deferred,
+    freeze_fields,
+    frozen,
+    require_shape,
+    runs_of,
+)
 from viewer.rigs.bodies.pose_features import Feature
 from viewer.rigs.checked_fields import checked
 from viewer.rigs.expressions import ExpressionRules, MaterialBinds
@@ -63,15 +72,11 @@ class BlendShapes:
         for name, size in (("origins", ()), ("ranges", (2,))):
             if getattr(self, name) is not None:
                 freeze_fields(self, **{name: (len(self.names), *size)})
-        if not isinstance(self.offsets, Deferred):
-            freeze_fields(self, offsets=(len(self.names), None, 3))
-        if self.normal_offsets is not None and not isinstance(self.normal_offsets, Deferred):
-            freeze_fields(self, normal_offsets=(None, None, 3))
+        freeze_fields(self, offsets=(len(self.names), None, 3))
+        if self.normal_offsets is not None:
+            freeze_fields(self, normal_offsets=self.offsets.shape)
         if not self.groups:
             object.__setattr__(self, "groups", ("shape",) * len(self.names))
-        _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
-        if self.normal_offsets is not None:
-            _check_shape("normal_offsets", self.normal_offsets.shape, self.offsets.shape)
         if self.rest_weights is not None:
             weights = frozen("rest_weights", self.rest_weights, (len(self.names),))
             object.__setattr__(self, "rest_weights", weights if weights.any() else None)
@@ -156,11 +161,12 @@ class BlendShapes:
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
-        if isinstance(offsets, DeferredOffsets):
-            whole = np.zeros(self.n_shapes)
-            whole[: len(weights)] = weights
-            return offsets.total(whole)
-        return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
+        whole = np.zeros(self.n_shapes)
+        whole[: len(weights)] = weights
+        total = deferred(offsets).total(whole)
+        if total is not None:
+            return total
+        return np.einsum("s,sva->va", weights[active], deferred(offsets).values()[active])
 
     def _check_count(self, weights: Floats) -> None:
         if len(weights) > self.n_shapes:
@@ -168,12 +174,12 @@ class BlendShapes:
 
     def direction_values(self) -> Floats:
         """Return the offsets, read from the file on first use: (S, V, 3)."""
-        return _values(self.offsets)
+        return deferred(self.offsets).values()
 
     def normal_values(self) -> Floats:
         """Return the offsets of the normals, zeros if there are none: (S, V, 3)."""
         offsets = self.normal_offsets
-        return np.zeros(self.offsets.shape) if offsets is None else _values(offsets)
+        return np.zeros(self.offsets.shape) if offsets is None else deferred(offsets).values()
 
 
 @checked
@@ -188,14 +194,11 @@ class Correctives:
     nine for each joint except the root."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.offsets, Deferred):
-            freeze_fields(self, offsets=(None, None, 3))
+        freeze_fields(self, offsets=(None, None, 3))
         count = self.offsets.shape[0]
         if self.feature is not None:
-            _check_shape(
-                "offsets", self.offsets.shape, (self.feature.n_weights, self.n_vertices, 3)
-            )
-        elif len(self.offsets.shape) != 3 or count % _BLOCK:
+            require_shape("offsets", self.offsets.shape, (self.feature.n_weights, None, 3))
+        elif count % _BLOCK:
             raise RigError(f"offsets: expected nine for each joint except the root, found {count}")
 
     @property
@@ -208,32 +211,30 @@ class Correctives:
         """Number of weights that are skipped together if all of them are 0."""
         return _BLOCK if self.feature is None else 1
 
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the offsets are expected to be mostly zero."""
+        return deferred(self.offsets).is_sparse
+
     def values(self) -> Floats:
         """Return the offsets, read from the file on first use."""
-        return _values(self.offsets)
+        return deferred(self.offsets).values()
 
     def of_vertices(self, vertices: Ints, weights: Floats) -> Floats:
         """Return sum_p c_p d_p at some vertices only: (N, 3) for weights (P,)."""
         active = np.flatnonzero(weights)
-        if isinstance(self.offsets, SparseOffsets):
-            offsets = self.offsets.of_vertices(vertices)[active]
-        else:
-            offsets = self.values()[active[:, None], vertices[None, :]]
-        return np.einsum("p,pva->va", weights[active], offsets.astype(np.float64, copy=False))
+        offsets = deferred(self.offsets).columns(vertices)[active]
+        return np.einsum("p,pva->va", weights[active], offsets)
 
     def check_values(self) -> None:
         """Read the offsets; raises FormatError if they are damaged."""
-        if isinstance(self.offsets, SparseOffsets):
-            self.offsets.total(np.zeros(self.offsets.shape[0]))
-        else:
-            self.values()
+        deferred(self.offsets).check()
 
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_p c_p d_p, (V, 3), for weights (P,), skipping joints without rotation."""
-        if isinstance(self.offsets, SparseOffsets) and weights.any():
-            found = self.offsets.total(weights)
-            if found is not None:
-                return found
+        found = deferred(self.offsets).total(weights) if weights.any() else None
+        if found is not None:
+            return found
         total = np.zeros(3 * self.n_vertices)
         for rows in active_rows(weights, self.block):
             total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)
@@ -301,12 +302,3 @@ def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
         for axis in range(3)
     ]
     return bias + np.stack(columns, axis=1)
-
-
-def _values(offsets: Floats | Deferred) -> Floats:
-    return offsets.values() if isinstance(offsets, Deferred) else offsets
-
-
-def _check_shape(name: str, found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
-    if found != wanted:
-        raise RigError(f"{name}: expected shape {wanted}, found {found}")

@@ -8,9 +8,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rigs.annotations import Keypoints, keypoint_positions
-from viewer.rigs.arrays import Deferred, Floats, Ints
+from viewer.rigs.arrays import Deferred, Floats, Ints, deferred
 from viewer.rigs.blendshapes import BlendShapes, Correctives
-from viewer.rigs.bodies.offsets import SparseOffsets
 from viewer.rigs.figure import Figure
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import Mesh
@@ -65,10 +64,6 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     )
 
 
-def _columns(offsets: Floats | Deferred, vertices: Ints) -> Floats | Deferred:
-    if not isinstance(offsets, Deferred):
-        return offsets[:, vertices]
+def _columns(offsets: Floats | Deferred, vertices: Ints) -> Deferred:
     shape = (offsets.shape[0], len(vertices), 3)
-    if isinstance(offsets, SparseOffsets):
-        return Deferred(shape, np.float64, lambda: offsets.of_vertices(vertices))
-    return Deferred(shape, offsets.dtype, lambda: offsets.values()[:, vertices])
+    return Deferred(shape, np.float64, lambda: deferred(offsets).columns(vertices))

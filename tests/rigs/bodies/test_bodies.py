@@ -96,7 +96,7 @@ def test_feature_correctives_move_the_rest_mesh():
 
 
 def test_correctives_without_a_row_per_feature_weight_are_refused():
-    with pytest.raises(RigError, match=r"\(8, 3, 3\)"):
+    with pytest.raises(RigError, match="expected shape 8 x any x 3, found 9 x 3 x 3"):
         Correctives(np.zeros((9, 3, 3)), QuaternionFeature(3, has_root=False))
 
 
@@ -155,7 +155,7 @@ def test_sums_are_those_of_the_whole_array(density, ways):
 def test_offsets_of_some_vertices_are_the_stored_ones():
     values = array(0.05)
     few = np.array([7, 49, 0], dtype=np.int32)
-    assert_array_equal(sparse(values, []).of_vertices(few), values[:, few].astype(np.float64))
+    assert_array_equal(sparse(values, []).columns(few), values[:, few].astype(np.float64))
 
 
 def test_rest_pose_reads_no_data():
@@ -168,7 +168,7 @@ def test_rest_pose_reads_no_data():
 def test_arrays_of_zeros_have_no_offsets(count):
     offsets = sparse(np.zeros((count, VERTICES, 3), np.float32), [])
     assert_array_equal(offsets.total(np.ones(count)), np.zeros((VERTICES, 3)))
-    assert not offsets.of_vertices(np.arange(3)).any()
+    assert not offsets.columns(np.arange(3)).any()
 
 
 def test_check_reads_the_file_once():

@@ -22,7 +22,7 @@ from viewer.errors import FormatError
 from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import axes, counted, printable
-from viewer.rigs.arrays import Deferred
+from viewer.rigs.arrays import Deferred, deferred
 
 _WANTED = {"biuf": "number", "iuf": "number", "iu": "integer", "SU": "string"}
 """Names of the elements of arrays, by numpy's kind letters."""
@@ -378,7 +378,7 @@ def _from_lists(value: Value) -> Deferred | None:
         return None
     if array.dtype.kind not in "biuf":
         return None
-    return Deferred(array.shape, array.dtype, lambda: array)
+    return deferred(array)
 
 
 _Numbers: TypeAlias = "list[_Numbers] | NDArray[np.generic] | float | None"

@@ -21,7 +21,6 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer, float32, reserved
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.blendshapes import Correctives, active_rows
-from viewer.rigs.bodies.offsets import SparseOffsets
 
 Way: TypeAlias = Literal["cpu", "gpu"]
 WAYS: tuple[Way, ...] = ("cpu", "gpu")
@@ -100,7 +99,7 @@ class CorrectiveSums:
     @property
     def can_use_gpu(self) -> bool:
         """Whether the driver has compute shaders and room for the offsets."""
-        if isinstance(self.correctives.offsets, SparseOffsets):
+        if self.correctives.is_sparse:
             return False  # most of the work would be multiplications by 0
         count, vertices, _ = self.correctives.offsets.shape
         if 3 * len(self.sources) > _COLUMNS * _MOST_GROUPS:
@@ -115,7 +114,7 @@ class CorrectiveSums:
     def _summed(self, weights: Floats) -> _Rows:
         """Return the sums of the correctives, (A, 3 V), for weights (A, P)."""
         correctives = self.correctives
-        if isinstance(correctives.offsets, SparseOffsets):
+        if correctives.is_sparse:
             return float32(np.stack([correctives.displacement(row).reshape(-1) for row in weights]))
         if self._product is None:
             values = correctives.values()

@@ -27,6 +27,8 @@ class SparseOffsets(Deferred):
 
     __slots__ = ("_blocks", "_entries", "_lock")
 
+    is_sparse = True
+
     def __init__(
         self,
         shape: tuple[int, ...],
@@ -39,17 +41,21 @@ class SparseOffsets(Deferred):
         self._entries: csc_array | None = None
 
     def total(self, weights: Floats) -> Floats | None:
-        """Return sum_p w_p d_p, (V, 3), for weights (P,); None if the offsets are not sparse."""
+        """Return sum_p w_p d_p, (V, 3), for weights (P,); None if there are too few zeros."""
         entries = self._read_once()
         return None if entries is None else np.reshape(entries.T @ weights, (-1, 3))
 
-    def of_vertices(self, vertices: Ints) -> Floats:
+    def check(self) -> None:
+        """Read the offsets; raises ``FormatError`` if they are damaged."""
+        self._read_once()
+
+    def columns(self, indices: Ints) -> Floats:
         """Return the offsets of some vertices: (P, N, 3)."""
         entries = self._read_once()
         if entries is None:
-            return self.values()[:, vertices].astype(np.float64)
-        columns = 3 * vertices.astype(np.intp)[:, None] + np.arange(3)
-        return np.reshape(entries[:, columns.reshape(-1)].toarray(), (-1, len(vertices), 3))
+            return super().columns(indices)
+        columns = 3 * indices.astype(np.intp)[:, None] + np.arange(3)
+        return np.reshape(entries[:, columns.reshape(-1)].toarray(), (-1, len(indices), 3))
 
     def _read_once(self) -> csc_array | None:
         with self._lock:
@@ -84,7 +90,7 @@ class SparseOffsets(Deferred):
 class DeferredOffsets(Deferred):
     """Offsets of blend shapes whose weighted sum does not need the whole array."""
 
-    __slots__ = ("total",)
+    __slots__ = ("_total",)
 
     def __init__(
         self,
@@ -93,4 +99,8 @@ class DeferredOffsets(Deferred):
         total: Callable[[Floats], Floats],
     ) -> None:
         super().__init__(shape, np.float64, load)
-        self.total = total
+        self._total = total
+
+    def total(self, weights: Floats) -> Floats:
+        """Return sum_s w_s d_s, (V, 3), for weights (S,)."""
+        return self._total(weights)
