@@ -15,8 +15,12 @@ from viewer.phrases import Remedy, rounded
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.quaternion import multiply, rotation_vector_to_quaternion
-from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
+from viewer.rigs.geometry.quaternion import multiply
+from viewer.rigs.geometry.rotation import (
+    matrix_to_quaternion,
+    rotation_vector_to_matrix,
+    up_rotation,
+)
 from viewer.rigs.geometry.vectors import SIGNED_UPS, SignedUp
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, root_positions
 from viewer.rigs.motion.evaluation import Frames, frames_of
@@ -118,11 +122,9 @@ def family_frames(
     if up_axis(options) != options.world_up:
         # For another up axis the world is rotated by Q about x: R' = Q R, and as the root moves
         # from t + J0 to Q (t + J0) while J0 stays, t' = Q (t + J0) - J0.
-        rotation = quarter_turn(up_axis(options))
+        matrix = up_rotation(options.world_up, up_axis(options))
         rotations = rotations.copy()
-        rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
-        # A rotation by 90 degrees has integer entries.
-        matrix = np.round(rotation_vector_to_matrix(rotation))
+        rotations[:, 0] = multiply(matrix_to_quaternion(matrix), rotations[:, 0])
         translations = (translations + roots) @ matrix.T - roots
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     columns = {
@@ -248,8 +250,7 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
     if up_axis(options) == options.world_up:
         return found
-    back = -quarter_turn(up_axis(options))
-    return rotated_frames(figure, found, rotation_vector_to_quaternion(back))
+    return rotated_frames(figure, found, up_rotation(up_axis(options), options.world_up))
 
 
 def padded(rows: Floats, fewest: int) -> Floats:

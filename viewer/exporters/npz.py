@@ -43,8 +43,7 @@ from viewer.phrases import all_of, counted, optional
 from viewer.rigs.arrays import Arrays, Bools, Deferred, Floats
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rigs.geometry.rotation import quarter_turn, rotation_vector_to_matrix
+from viewer.rigs.geometry.rotation import up_rotation
 from viewer.rigs.motion.evaluation import pose_of, world_frames
 from viewer.rigs.motion.sampled_animation import SampledAnimation, SampledPoints, rotated_frames
 from viewer.rigs.posing.pose_vector import write_vector
@@ -119,7 +118,7 @@ def _export_frames(
     frames, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     skeleton = figure.require_skeleton()
     if up != options.world_up:
-        frames = rotated_frames(figure, frames, rotation_vector_to_quaternion(quarter_turn(up)))
+        frames = rotated_frames(figure, frames, up_rotation(options.world_up, up))
     world = world_frames(figure, frames)
     world[~frames.present] = np.nan
     order = [options.quaternions.index(part) for part in "xyzw"]
@@ -162,10 +161,8 @@ def _motion_losses(
     animation: SampledAnimation, again: Archive, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
     """Return a note with the largest errors of a file that was read back, in its own frames."""
-    figure, frames, up = animation.figure, animation.frames, options.up or options.world_up
-    turned = np.eye(3)
-    if up != options.world_up:
-        turned = np.round(rotation_vector_to_matrix(quarter_turn(up)))
+    figure, frames = animation.figure, animation.frames
+    turned = up_rotation(options.world_up, options.up or options.world_up)
     vertices, joints = _read(again, "vertices"), _read(again, "joints")
     losses = PoseLosses(figure, options.skinning)
     for frame in np.flatnonzero(frames.present).tolist():
@@ -189,9 +186,8 @@ def _export_points(
 ) -> list[Diagnostic]:
     """Write captured points of all frames as float64 arrays, with their up axis."""
     _check("", options)
-    up, points = options.up or options.world_up, animation.points
-    if up != options.world_up:
-        points = points @ np.round(rotation_vector_to_matrix(quarter_turn(up))).T
+    up = options.up or options.world_up
+    points = animation.points @ up_rotation(options.world_up, up).T
     arrays: Arrays = {
         "name": np.array(animation.name),
         "up": np.array(up),

@@ -10,7 +10,8 @@ from viewer.diagnostics import Diagnostic
 from viewer.loading.scaling import known_unit, scale_to_unit, scaling
 from viewer.loading.scene_draft import SceneDraft
 from viewer.rigs.arrays import Floats
-from viewer.rigs.geometry.transform import rotation_transform, translation_matrix
+from viewer.rigs.geometry.rotation import up_rotation
+from viewer.rigs.geometry.transform import affine_matrices, translation_matrix
 from viewer.rigs.scene import Actor, Scene, scene_box, scene_unit
 from viewer.rigs.units import METRES
 
@@ -34,9 +35,7 @@ def stand_up(draft: SceneDraft, world_up: str) -> None:
 
 
 def _turn(turned: Actor | Builder, up: str, world_up: str) -> None:
-    if up != world_up:
-        quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
-        turned.placement = rotation_transform(0, quarter) @ turned.placement
+    turned.placement = affine_matrices(up_rotation(up, world_up), np.zeros(3)) @ turned.placement
 
 
 def placed_like(scene: Scene, actor: Actor) -> list[Diagnostic]:

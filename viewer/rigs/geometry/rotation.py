@@ -140,11 +140,6 @@ def are_rotations(matrices: Floats, tolerance: float) -> Bools:
     return found
 
 
-def quarter_turn(up: str) -> Floats:
-    """Return the rotation vector about x from the other up axis, y or z, to ``up``."""
-    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
-
-
 def up_rotation(source: str, target: str) -> Floats:
     """Return the rotation (3, 3) about x from one up axis to another, "y" or "z"; exact."""
     if source == target:

@@ -12,7 +12,7 @@ from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply
-from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.geometry.vectors import HANGING, SignedUp, Up
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.clip_edit import clip_from_pose
@@ -136,21 +136,19 @@ def upright_animation(
 
 def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
     """Return the frames rotated by 180 degrees about x."""
-    return rotated_frames(figure, frames, np.array([1.0, 0.0, 0.0, 0.0]))
+    return rotated_frames(figure, frames, np.diag([1.0, -1.0, -1.0]))
 
 
 def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
-    """Rotate frames and the root's path by q (4,), a multiple of 90 degrees about an axis."""
+    """Rotate frames and the root's path by Q (3, 3)."""
     # The root joint is at p = s (rest + t) + T in the figure. R' = Q R, and T' = Q p - s (rest + t)
     # brings it to Q p.
     rotations = frames.rotations.copy()
     roots = np.flatnonzero(figure.require_skeleton().parents < 0)
-    rotations[:, roots] = multiply(rotation, rotations[:, roots])
+    rotations[:, roots] = multiply(matrix_to_quaternion(rotation), rotations[:, roots])
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
-    # A rotation by a multiple of 90 degrees has integer entries.
-    matrix = np.round(quaternion_to_matrix(rotation))
-    place = (inner + frames.figure_translations) @ matrix.T - inner
+    place = (inner + frames.figure_translations) @ rotation.T - inner
     return replace(frames, rotations=rotations, figure_translations=place)
 
 
