@@ -9,6 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, freeze_fields
+from viewer.rigs.geometry.rotation import nearest_rotations
 
 # Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.
@@ -75,11 +76,10 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
         extents = np.linalg.svd(cloud, compute_uv=False)
         if extents[1] <= _ON_LINE * extents[0]:
             raise RigError("alignment: expected points in a plane or in space, found a line")
-    # With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
-    # s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
-    left, values, right = np.linalg.svd(q.T @ p)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    rotation = (left * signs) @ right
-    found = float(values @ signs / np.einsum("na,na->", p, p)) if scale is None else scale
+    # With means removed, sum_i q_i p_i^T = U D V^T = R P, R = U S V^T, S = diag(1, 1, det(U V^T)),
+    # s = tr(D S) / sum |p_i|^2 with tr(D S) = tr P, t = mean q - s R mean p (Umeyama 1991, eqs. 39
+    # to 43).
+    rotation, stretch = nearest_rotations(q.T @ p)
+    found = float(np.trace(stretch) / np.einsum("na,na->", p, p)) if scale is None else scale
     shift = to_mean - found * rotation @ from_mean
     return Similarity(found, rotation, shift, np.ones(3))
