@@ -126,6 +126,8 @@ def family_frames(
         rotations = rotations.copy()
         rotations[:, 0] = multiply(matrix_to_quaternion(matrix), rotations[:, 0])
         translations = (translations + roots) @ matrix.T - roots
+    space = ShapeSpace(model or member.title)
+    translations = translations - figure.shape_space.root_offset(space)
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     columns = {
         kind: [index for index, group in enumerate(groups) if group == kind]
@@ -133,7 +135,6 @@ def family_frames(
     }
     coefficients = {kind: frames.shape_weights[:, listed] for kind, listed in columns.items()}
     notes: list[Diagnostic] = []
-    space = ShapeSpace(model or member.title)
     if not space.shares_coefficients(figure.shape_space):
         if any(rows.any() for rows in coefficients.values()):
             notes.append(
@@ -243,7 +244,8 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     """Return the poses of a file (metres) for an animation's figure, in its world and unit."""
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
-    moved = motion.translations / METRES[figure.unit]
+    moved = motion.translations + figure.shape_space.root_offset(motion.shape_space)
+    moved = moved / METRES[figure.unit]
     # Coefficients were written as they are, so they are read as those of the figure.
     motion = replace(motion, timing=timing, translations=moved, shape_space=figure.shape_space)
     clip, _ = body_clip(motion, figure)

@@ -40,7 +40,8 @@ def with_joints(body: Figure, names: Sequence[str]) -> Figure:
         rest_scales=np.concatenate([skeleton.rest_scales, np.ones((count, 3))]),
         boxes=None,
     )
-    return Figure(body.name, skeleton=extended, up=body.up, unit=body.unit)
+    space = body.shape_space
+    return Figure(body.name, skeleton=extended, up=body.up, unit=body.unit, shape_space=space)
 
 
 def body_drive(

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from rigs.hand_made import skeleton
 
 from viewer.errors import RigError
-from viewer.rigs.bodies.smpl_family import FAMILY
+from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rigs.motion.evaluation import frames_of, pose_of
+from viewer.rigs.motion.evaluation import frames_of, pose_of, world_frames
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.skinning import deform
 
@@ -139,6 +139,27 @@ def test_root_positions_follow_the_shape(family):
         for shape in shapes
     ]
     assert_allclose(root_positions(family("smpl"), shapes), expected, rtol=0, atol=ATOL)
+
+
+@pytest.mark.parametrize("centre", ["pelvis", "origin", "world"])
+@pytest.mark.parametrize(("own", "other"), [("smpl", "SMPL-X"), ("smplx", "SMPL+H")])
+def test_pelvis_is_where_the_model_of_the_file_puts_it(family, own, other, centre):
+    """The pelvis of SMPL-X is 128 mm further below its origin: others floated by that much."""
+    figure = family(own)
+    step = np.array([0.005, -0.128, -0.016]) * (1 if other == "SMPL-X" else -1)
+    rotates, world = centre != "pelvis", centre == "world"
+    given = motion(
+        ("pelvis",),
+        [[0, 0, 0] if world else TURN],
+        about_origin=centre == "origin",
+        world_rotations=TURN[None] if world else None,
+        shape_space=ShapeSpace(other),
+    )
+    frames = frames_of(figure, body_clip(given, figure)[0], np.zeros(1))
+    found = world_frames(figure, frames)[0, 0, :3, 3]
+    root = root_positions(figure, np.zeros((1, figure.blend_shapes.n_shapes)))[0] + step
+    expected = MOVE + (rotation(TURN) @ root if rotates else root)
+    assert_allclose(found, expected, rtol=0, atol=ATOL)
 
 
 def test_missing_joints_of_the_figure_are_reported(family):

@@ -53,8 +53,19 @@ class ShapeSpace:
         models = {_SHARED.get(model, model) for model in (self.model, other.model)}
         return "" in models or len(models) == 1
 
+    def root_offset(self, other: ShapeSpace) -> tuple[float, float, float]:
+        """Return how far the rest root of another model is from this one's, metres; y is up."""
+        models = [_SHARED.get(space.model, space.model) for space in (self, other)]
+        if not set(models) <= set(_ROOTS):
+            return 0.0, 0.0, 0.0
+        own, theirs = (_ROOTS[model] for model in models)
+        return theirs[0] - own[0], theirs[1] - own[1], theirs[2] - own[2]
+
 
 _SHARED = {"SMPL+H": "SMPL", "SKEL": "SMPL"}
+# Rest positions of the pelvis of the published neutral templates, in metres: the origin of SMPL is
+# in the waist, that of SMPL-X in the chest.
+_ROOTS = {"SMPL": (-0.002, -0.223, 0.028), "SMPL-X": (0.003, -0.351, 0.012)}
 
 
 def gender_of(text: str) -> str:

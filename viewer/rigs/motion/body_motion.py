@@ -109,6 +109,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 
     RigError if the figure has none of the joints; those without a vector stay at rest.
     """
+    # The root of the file's model, to which its translations belong, relative to the figure's.
+    offset = np.array(figure.shape_space.root_offset(motion.shape_space))
     motion, said = _in_space_of(motion, figure)
     skeleton = figure.skeleton
     if skeleton is None or motion.joint_names[0] not in skeleton.names:
@@ -146,13 +148,15 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         origin_rotations = rotations[:, 0]
     elif motion.places_root:
         translations = translations - root_positions(figure, weights)
+    else:
+        translations = translations + offset
     if origin_rotations is not None:
         # t = T - J0 + R J0: skinning rotates about the rest root J0 of the frame's own shape, the
         # file about the origin, so the vertices are exactly R X + T. A rotation W of the whole
-        # world adds to the root's: W R, and t = T - J0 + W J0.
+        # world adds to the root's: W R, and t = T - J0 + W J0. The rotated J0 is that of the file.
         root = root_positions(figure, weights)
         matrices = quaternion_to_matrix(origin_rotations)
-        rotated_roots = np.einsum("nab,nb->na", matrices, root + 0.0 * translations)
+        rotated_roots = np.einsum("nab,nb->na", matrices, root + offset + 0.0 * translations)
         translations = translations - root + rotated_roots
     clip = SampledClip(
         motion.name,
