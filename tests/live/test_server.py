@@ -12,11 +12,13 @@ import stat
 import sys
 import threading
 import time
+import warnings
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import platformdirs
 import pytest
 from live.test_live_messages import framed
 from live_screen import can_undo, screen_at
@@ -120,8 +122,9 @@ def test_actor_of_the_window_is_fetched_and_moved(screen, live):
     assert len(screen.state.scene.actors) == 1
 
 
-def test_unknown_name_lists_what_there_is(live):
-    with pytest.raises(ViewerError, match="second"):
+def test_unknown_name_lists_what_there_is(screen, live):
+    shown = re.escape(screen.state.actor.name)
+    with pytest.raises(ViewerError, match=f'no actor "second"; there is 1: {shown}$'):
         live["second"]
 
 
@@ -746,3 +749,14 @@ def test_folder_that_others_can_write_is_refused(tmp_path, monkeypatch):
     usual.parent.chmod(0o777)
     with pytest.raises(ViewerError, match="nobody else can write"):
         file_path()
+
+
+def test_machine_without_a_runtime_folder_is_not_warned_about(tmp_path, monkeypatch):
+    monkeypatch.delenv("VIEWER_CONNECTION_FILE", raising=False)
+
+    def warned(*_, **named):
+        warnings.warn("XDG_RUNTIME_DIR is not set", UserWarning, stacklevel=2)
+        return str(tmp_path / "viewer")
+
+    monkeypatch.setattr(platformdirs, "user_runtime_dir", warned)
+    assert file_path() == tmp_path / "viewer" / "window.json"

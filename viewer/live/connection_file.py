@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import stat
+import warnings
 from pathlib import Path
 
 import platformdirs
@@ -36,7 +37,10 @@ def file_path(path: str | Path | None = None) -> Path:
 
 def _folder() -> Path:
     """Return the user's runtime folder, created for the user alone."""
-    folder = Path(platformdirs.user_runtime_dir("viewer", appauthor=False))
+    with warnings.catch_warnings():
+        # Newer versions warn where the system names no runtime folder; that in /tmp is checked.
+        warnings.simplefilter("ignore")
+        folder = Path(platformdirs.user_runtime_dir("viewer", appauthor=False))
     try:
         folder.mkdir(parents=True, mode=0o700, exist_ok=True)
         status = folder.stat()

@@ -38,6 +38,7 @@ from viewer.live.messages import (
 )
 from viewer.live.objects import pack, unpack
 from viewer.live.server import POSE
+from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
@@ -144,10 +145,12 @@ class Live:
             if own:
                 self._read_edits()
                 return own[0]
-            for number, title in self._get()["actors"]:
+            shown = self._get()["actors"]
+            for number, title in shown:
                 if name == title:
                     return self._fetched(number)
-            return self.scene[name]  # raises, with the names of this program's actors
+        hint = name_hint(name, [title for _, title in shown])
+        raise ViewerError(f'no actor "{printable(name, 60)}"; {hint}')
 
     def _fetched(self, number: int) -> Actor:
         answer = self._ask("fetch", {"actor": number})
