@@ -42,7 +42,7 @@ def test_short_lists_are_shown_in_full_and_long_ones_truncated():
 
 def test_names_from_files_stay_on_one_line():
     assert did_you_mean("knee", ["kn\nee"]) == r"did you mean kn\nee?"
-    assert name_hint("x", ["\x1b[31m"]) == r"there are 1: \x1b[31m"
+    assert name_hint("x", ["\x1b[31m"]) == r"there is 1: \x1b[31m"
 
 
 def test_long_strings_are_compared_by_their_start():

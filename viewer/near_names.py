@@ -71,4 +71,5 @@ def name_hint(text: str, names: Iterable[str]) -> str:
     count = len(all_names)
     first = all_names if count <= _MOST_LISTED else all_names[:_BEGINNING]
     listed = ", ".join(printable(name, _LONGEST) for name in first)
-    return f"there are {count}: {listed}{', …' if len(first) < count else ''}"
+    rest = ", …" if len(first) < count else ""
+    return f"there {'is' if count == 1 else 'are'} {count}: {listed}{rest}"

@@ -184,7 +184,7 @@ def test_unknown_field_suggests_the_nearest_name():
     scene = Scene([Actor(Figure("scan", mesh(np.eye(3)), fields=(far, matched)))])
     for name, hint in (
         ("field:distanc", 'no field is called "distanc"; did you mean distance?'),
-        ("class:distance", 'no field is called "distance"; there are 1: match'),
+        ("class:distance", 'no field is called "distance"; there is 1: match'),
     ):
         with pytest.raises(ViewerError) as caught:
             scalar_notes(scene, DisplayOptions(shading="scalar", scalar=name))

@@ -307,7 +307,7 @@ def test_field_view_shows_the_named_or_the_first_field():
     assert categories("class", figure) == ("near", "filled")
     assert missing_part("field:near", figure) == 'a field "near"'
     assert missing_part("class", replace(figure, fields=(FAR,))) == "classes"
-    with pytest.raises(RigError, match=r'^no field is called "match"; there are 1: far$'):
+    with pytest.raises(RigError, match=r'^no field is called "match"; there is 1: far$'):
         compute("field:match", figure, None, Skinning())
 
 
