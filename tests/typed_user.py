@@ -1,6 +1,7 @@
 """A user's script, which mypy checks but nobody runs: the types of the public names."""
 
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,27 @@ knee: NDArray[np.float64] = still["left_knee"]
 weights = np.zeros((3, 2))
 fig = viewer.figure(V[0], [[0, 1, 2]], weights=weights, joints=J, parents=[-1, 0], names=["a", "b"])
 fig2 = viewer.figure([[0, 0, 0]], np.zeros((0, 3), int), weights=(np.zeros((1, 2), int), weights))
+
+
+class Sparse(Protocol):
+    """What scipy's types state: read-only attributes."""
+
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def row(self) -> NDArray[np.int32]: ...
+    @property
+    def col(self) -> NDArray[np.int32]: ...
+    @property
+    def data(self) -> NDArray[np.float64]: ...
+    def tocoo(self) -> "Sparse": ...
+
+
+def sparse(matrix: Sparse) -> viewer.Figure:
+    """Return a figure with such weights."""
+    return viewer.figure([[0, 0, 0]], [[0, 0, 0]], weights=matrix)
+
+
 act = viewer.animate(fig, rotations=np.zeros((30, 2, 3)), translations=None, fps=30)
 act = viewer.animate(fig, np.zeros((30, 2, 4)), representation="quaternion", present=[True] * 30)
 notes: list[str] = [str(note) for note in viewer.export(act, "own.glb")]
@@ -53,6 +75,9 @@ points, normals = viewer.deform(person.figure, pose, viewer.Skinning(method="dqs
 options = viewer.DisplayOptions(wireframe=True, shading="pbr")
 camera = viewer.Camera(distance=8.0)
 viewer.render(scene, camera=camera, options=options)
+bent = viewer.shaped(person.figure, [0.5, 1.0])
+bent = viewer.with_rest_mesh(bent, [[0, 0, 0]])
+pose.dofs = [0.5] * 3
 report: viewer.Report = viewer.batch("data/*.npz", "convert", "out", to="bvh")
 for actor in scene:
     print(actor.name, len(scene), repr(actor))

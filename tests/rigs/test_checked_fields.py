@@ -70,6 +70,13 @@ SET = [
     ("light", "color", "red", "color: expected 3 numbers, found str"),
     ("camera", "distance", None, "distance: expected a number, found NoneType"),
     ("camera", "target", [1, 2], "target: expected shape 3, found 2"),
+    ("camera", "distance", 0, "distance: expected 1e-09 or more, found 0"),
+    ("camera", "fov", 300, "fov: expected 1e-09 to 180, found 300"),
+    ("options", "samples", -3, "samples: expected 1 or more, found -3"),
+    ("options", "passes", -1, "passes: expected 1 or more, found -1"),
+    ("options", "min_confidence", 2, "min_confidence: expected 0 to 1, found 2"),
+    ("options", "path_seconds", -1, "path_seconds: expected 0 or more, found -1"),
+    ("options", "skeleton_opacity", 3, "skeleton_opacity: expected 0 to 1, found 3"),
     ("camera", "up", "x", 'up: no value "x"; there are 2: y, z'),
 ]
 MADE = [
@@ -89,6 +96,7 @@ MADE = [
     (BONED.skeleton, "posing", 3, "posing: expected JointPosing or None, found int"),
     (BONED.skeleton, "dof_limits", "x", "dof_limits: expected shape 3 x 2 without NaN"),
     (viewer.Texture("t"), "encoded", "x", "encoded: expected bytes or None, found str"),
+    (viewer.Material("m"), "extras", {1, 2}, "extras: expected data of JSON, found Object of type"),
     (viewer.Material("m"), "shade_range", (0, "x"), "shade_range[1]: expected a number"),
 ]
 
@@ -128,6 +136,25 @@ def test_arrays_and_lists_that_fit_stay_the_same_object():
     placed[0, 3] = 5.0
     actors.append(actor)
     assert actor.placement[0, 3] == 5.0 and len(made) == 2
+
+
+def test_a_camera_does_not_move_with_the_array_that_it_was_made_of():
+    place = np.zeros(3)
+    camera = viewer.Camera(target=place)
+    place[0] = 5.0
+    assert camera.target.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "found"),
+    # The pose of one ball joint has 3 + 10 + 3 values, of which 3 are DOFs.
+    [("n_dofs", -1, "-1 of 1.4"), ("n_dofs", 2, "2 of 1.1"), ("values", np.zeros(6), "3 of 0")],
+)
+def test_a_pose_whose_numbers_no_longer_fit_its_skeleton_is_refused(name, value, found):
+    actor = scene()[0]
+    setattr(actor.pose, name, value)
+    with pytest.raises(viewer.ViewerError, match=f"expected 3 DOFs of 1 joint, found {found}$"):
+        viewer.deform(BONED, actor.pose)
 
 
 def test_numbers_near_the_largest_are_kept_without_a_warning():

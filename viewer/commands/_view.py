@@ -179,8 +179,6 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
     """Return the requested display options."""
     if arguments.background not in BACKGROUNDS:
         parse_color(arguments.background)
-    if arguments.samples < 1:
-        raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
     is_overlay = getattr(arguments, "overlay", None) is not None
     brightness = {"image_brightness": 1.0} if is_overlay else {}
     options = settings_of(

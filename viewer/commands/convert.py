@@ -52,6 +52,8 @@ from viewer.exporters import (
     exporters_at,
     exporters_of,
     files_written,
+    known_suffixes,
+    no_exporter,
     output_files,
     sampled,
     suited_exporter,
@@ -90,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes, "
+        help=f"one of {known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes, "
         "walk_{person}.glb for a file per person",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
@@ -131,11 +133,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_pose_arguments(parser)
     add_skinning_arguments(parser)
-
-
-def _known_suffixes() -> str:
-    suffixes = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
-    return ", ".join("a folder for EasyMocap" if each == FOLDER else each for each in suffixes)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -212,7 +209,7 @@ def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, for
         )
     suffix, kinds = output.suffix.lower() or FOLDER, exporters_at(output)
     if not kinds:
-        raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
+        raise no_exporter(output)
     if options.optimizes and not any("optimizes" in kind.options for kind in kinds):
         raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
     if options.page != PageOptions() and not any("page" in kind.options for kind in kinds):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
@@ -249,12 +249,24 @@ def exporters_of(path: str | Path, content: Content) -> list[str]:
         raise RigError(
             "there are only keypoints: a motion of joints cannot be written (.npz stores points)"
         )
-    plugged = (f".{found.name}" for found in plugins_of("exporters"))
-    suffixes = (each for kind in kinds.values() for each in kind.suffixes)
-    known = ", ".join(dict.fromkeys((*suffixes, *plugged)))
-    what = "no motion exporter" if content == "frames" else "no exporter"
-    shown = suffix or FOLDER if content == "frames" else suffix
-    raise UnsupportedFormatError(f'{what} for "{shown}"; supported: {known}')
+    if not exporters_at(path):
+        raise no_exporter(path)
+    what = "no motion exporter" if content == "frames" else "no exporter of poses"
+    known = known_suffixes(kinds.values())
+    raise UnsupportedFormatError(f'{what} for "{suffix or FOLDER}"; supported: {known}')
+
+
+def no_exporter(path: str | Path) -> UnsupportedFormatError:
+    """Return the error of a suffix that nothing writes."""
+    known = ", ".join([known_suffixes(), *(f".{each.name}" for each in plugins_of("exporters"))])
+    suffix = Path(path).suffix.lower() or FOLDER
+    return UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
+
+
+def known_suffixes(kinds: Iterable[Exporter] = EXPORTERS.values()) -> str:
+    """Return the suffixes of the built-in exporters, or of some, as text."""
+    suffixes = dict.fromkeys(each for kind in kinds for each in kind.suffixes)
+    return ", ".join("a folder for EasyMocap" if each == FOLDER else each for each in suffixes)
 
 
 def exporter_for(path: str | Path) -> str:

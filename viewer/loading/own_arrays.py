@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import NoneType
-from typing import Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,16 +34,30 @@ from viewer.rigs.units import METRES
 class Entries(Protocol):
     """A sparse matrix as entries, as ``tocoo`` of scipy's matrices returns it."""
 
-    row: NDArray[np.signedinteger]
-    col: NDArray[np.signedinteger]
-    data: Floats
+    @property
+    def row(self) -> NDArray[np.signedinteger]:
+        """(N,)."""
+        ...
+
+    @property
+    def col(self) -> NDArray[np.signedinteger]:
+        """(N,)."""
+        ...
+
+    @property
+    def data(self) -> NDArray[Any]:
+        """(N,)."""
+        ...
 
 
 @runtime_checkable
 class SparseWeights(Protocol):
     """A sparse matrix of scipy, (V, J)."""
 
-    shape: tuple[int, ...]
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(V, J)."""
+        ...
 
     def tocoo(self) -> Entries:
         """Return the entries."""

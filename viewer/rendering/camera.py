@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.rigs.arrays import Floats
 from viewer.rigs.checked_fields import checked
 from viewer.rigs.geometry.vectors import Up
@@ -51,13 +51,13 @@ class Camera:
 
     target: Floats = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
     """(3,). Point that the camera orbits, scene space."""
-    distance: float = 3.0
+    distance: float = setting(3.0, limits=(_SMALLEST, math.inf))
     """Distance from eye to target, scene units."""
     azimuth: float = _USUAL_AZIMUTH
     inclination: float = 15.0
     """Degrees about the up axis, and above the horizon. At 0, 0, the camera looks along -z if y is
     up, along +y if z is up."""
-    fov: float = 35.0
+    fov: float = setting(35.0, limits=(_SMALLEST, 180.0))
     """Vertical field of view, degrees."""
     orthographic: bool = False
     """Whether the projection is parallel, with the same height at the target."""
@@ -71,9 +71,13 @@ class Camera:
     seen: CameraView | None = None
     """``fixed`` at the time and in the pose of the scene; None if it does not move."""
 
+    def __post_init__(self) -> None:
+        # Cameras are moved in place: not with them the array that they were made of.
+        self.target = self.target.copy()
+
     def copy(self) -> Camera:
         """Return an independent copy."""
-        return replace(self, target=self.target.copy())
+        return replace(self)
 
     @property
     def pinhole(self) -> CameraView | None:

@@ -183,7 +183,7 @@ class DisplayOptions:
     )
     """Boxes as in the file, or small cubes; octahedra, sticks, or axes with x red, y green, z
     blue."""
-    skeleton_opacity: float | None = None
+    skeleton_opacity: float | None = setting(None, limits=(0.0, 1.0))
     """Opacity of the skeleton over the skin; None for the style's default in ``OPACITIES``."""
     background: str = setting(
         "gradient",
@@ -192,7 +192,9 @@ class DisplayOptions:
         metavar="NAME|#rrggbb",
     )
     """An entry of ``BACKGROUNDS`` or ``"#rrggbb"``."""
-    samples: int = setting(4, "samples per pixel (default: {default})", metavar="N")
+    samples: int = setting(
+        4, "samples per pixel (default: {default})", limits=(1, math.inf), metavar="N"
+    )
     """Limited by the driver's maximum."""
     quality: Quality = setting(
         "draft",
@@ -227,7 +229,7 @@ class DisplayOptions:
     )
     cull: bool = False
     """Cull back faces."""
-    passes: int = 8
+    passes: int = setting(8, limits=(1, math.inf))
     """Images that are averaged in final quality."""
     lights: Lights = field(default_factory=Lights)
     """The two lights."""
@@ -237,9 +239,9 @@ class DisplayOptions:
     """Indices of hidden body parts."""
     path_joints: tuple[tuple[int, int], ...] = ()
     """tuple of (actor, joint). Joints whose motion paths are drawn."""
-    path_seconds: float = 0.0
+    path_seconds: float = setting(0.0, limits=(0.0, math.inf))
     """Seconds of motion paths before and after the current time; 0 for the whole motion."""
-    min_confidence: float = 0.1
+    min_confidence: float = setting(0.1, limits=(0.0, 1.0))
     """Captured keypoints below this confidence are hidden."""
     opacity: float = setting(
         1.0, "opacity of the figures (default: {default})", limits=(0.0, 1.0), metavar="0..1"

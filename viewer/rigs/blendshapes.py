@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
@@ -110,7 +111,7 @@ class BlendShapes:
         """Return the displayed weights, by the rules of expressions: (N,)."""
         return weights if self.rules is None else self.rules.shown(weights)
 
-    def displacement(self, weights: Floats) -> Floats:
+    def displacement(self, weights: ArrayLike) -> Floats:
         """Return sum_s w_s d_s, or the displacement of the shape space.
 
         Parameters
@@ -129,11 +130,10 @@ class BlendShapes:
             If there are more weights than blend shapes.
         """
         if self.space is not None:
-            self._check_count(weights)
-            return self.space.displacement(weights)
+            return self.space.displacement(self._checked(weights))
         return self._weighted(self.offsets, weights)
 
-    def normal_displacement(self, weights: Floats) -> Floats | None:
+    def normal_displacement(self, weights: ArrayLike) -> Floats | None:
         """Return the offsets of the rest normals, sum_s w_s n_s.
 
         Parameters
@@ -154,10 +154,9 @@ class BlendShapes:
         offsets = self.normal_offsets
         return None if offsets is None else self._weighted(offsets, weights)
 
-    def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
+    def _weighted(self, offsets: Floats | Deferred, given: ArrayLike) -> Floats:
         """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
-        self._check_count(weights)
-        weights = self.shown(weights)
+        weights = self.shown(self._checked(given))
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
@@ -168,9 +167,11 @@ class BlendShapes:
             return total
         return np.einsum("s,sva->va", weights[active], deferred(offsets).values()[active])
 
-    def _check_count(self, weights: Floats) -> None:
+    def _checked(self, given: ArrayLike) -> Floats:
+        weights = frozen("weights", given, (None,))
         if len(weights) > self.n_shapes:
             raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
+        return weights
 
     def direction_values(self) -> Floats:
         """Return the offsets, read from the file on first use: (S, V, 3)."""

@@ -99,6 +99,7 @@ def _kept_passes(parents: bytes) -> tuple[tuple[Indices, Indices], ...]:
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return the joint-to-figure matrices (J, 4, 4) of a pose."""
+    pose.check_fits(skeleton)
     turns = joint_rotations(skeleton, pose)
     parts = local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
     return joint_worlds(skeleton.parents, *parts)

@@ -102,6 +102,13 @@ class Material:
         _check_range("emissive", self.emissive)
         _check_range("base_color", self.base_color or (), 1.0)
         _check_range("shade_color", self.shade_color or (), 1.0)
+        if self.extras is not None:
+            import json
+
+            try:
+                json.dumps(self.extras)
+            except (TypeError, ValueError, RecursionError) as problem:
+                raise RigError(f"extras: expected data of JSON, found {problem}") from None
 
     @property
     def textures(self) -> dict[str, Texture]:

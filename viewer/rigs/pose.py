@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -86,7 +85,7 @@ class Pose:
         return self.values[: self.n_dofs]
 
     @dofs.setter
-    def dofs(self, values: Floats) -> None:
+    def dofs(self, values: ArrayLike) -> None:
         _fill("dofs", self.dofs, values)
 
     @property
@@ -95,7 +94,7 @@ class Pose:
         return pose_arrays_of(self.values, self.n_dofs).translations
 
     @translations.setter
-    def translations(self, values: Floats) -> None:
+    def translations(self, values: ArrayLike) -> None:
         _fill("translations", self.translations, values)
 
     @property
@@ -104,7 +103,7 @@ class Pose:
         return pose_arrays_of(self.values, self.n_dofs).rotations
 
     @rotations.setter
-    def rotations(self, values: Floats) -> None:
+    def rotations(self, values: ArrayLike) -> None:
         _fill("rotations", self.rotations, values)
 
     @property
@@ -113,7 +112,7 @@ class Pose:
         return pose_arrays_of(self.values, self.n_dofs).scales
 
     @scales.setter
-    def scales(self, values: Floats) -> None:
+    def scales(self, values: ArrayLike) -> None:
         _fill("scales", self.scales, values)
 
     @property
@@ -122,7 +121,7 @@ class Pose:
         return self.values[-3:]
 
     @figure_translation.setter
-    def figure_translation(self, values: Floats) -> None:
+    def figure_translation(self, values: ArrayLike) -> None:
         _fill("figure_translation", self.figure_translation, values)
 
     @property
@@ -140,7 +139,7 @@ class Pose:
         skeleton, index = self._find(joint)
         return matrix_to_rotation_vector(joint_rotations(skeleton, self)[index])
 
-    def __setitem__(self, joint: str, rotation: Floats | Sequence[float]) -> None:
+    def __setitem__(self, joint: str, rotation: ArrayLike) -> None:
         """Rotate a joint relative to its parent by a rotation vector, radians: (3,)."""
         skeleton, index = self._find(joint)
         try:
@@ -148,7 +147,7 @@ class Pose:
         except (TypeError, ValueError):
             vector = np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation}")
+            raise RigError(f"{joint}: expected a rotation vector (3,), found {rotation!r}")
         joints, turned = np.array([index], dtype=np.int32), rotation_vector_to_matrix(vector)[None]
         set_joint_rotations(skeleton, self, joints, turned, "quaternion")
 
@@ -158,6 +157,16 @@ class Pose:
         if self.skeleton is None:
             raise RigError(f"{joint}: expected the pose of an actor, found one without joint names")
         return self.skeleton, find_joint(self.skeleton, joint)
+
+    def check_fits(self, skeleton: Skeleton, what: str = "pose") -> None:
+        """Raise ``RigError`` unless this is a pose of a skeleton, or of one like it."""
+        wanted = skeleton.n_dofs, skeleton.n_joints
+        found = self.n_dofs, (unwatched("values")(self).size - self.n_dofs - 3) / _PER_JOINT
+        if wanted != found:
+            raise RigError(
+                f"{what}: expected {counted(wanted[0], 'DOF')} of {counted(wanted[1], 'joint')}, "
+                f"found {found[0]} of {found[1]:g}"
+            )
 
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""

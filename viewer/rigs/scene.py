@@ -10,6 +10,7 @@ from types import NoneType
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
@@ -181,12 +182,7 @@ class Actor:
         check_type("pose", pose, Pose)
         skeleton = self.figure.skeleton
         if skeleton is not None:
-            wanted, found = (skeleton.n_dofs, skeleton.n_joints), (pose.n_dofs, len(pose.rotations))
-            if wanted != found:
-                raise RigError(
-                    f"pose of {self.name}: expected {counted(wanted[0], 'DOF')} of "
-                    f"{counted(wanted[1], 'joint')}, found {found[0]} of {found[1]}"
-                )
+            pose.check_fits(skeleton, f"pose of {self.name}")
         self.own_pose = pose
 
     def require_clip(self) -> Motion:
@@ -216,7 +212,7 @@ class Actor:
         """Return a joint's rotation, as ``pose[joint]`` does."""
         return self.pose[joint]
 
-    def __setitem__(self, joint: str, rotation: Floats | Sequence[float]) -> None:
+    def __setitem__(self, joint: str, rotation: ArrayLike) -> None:
         """Rotate a joint, as ``pose[joint] = rotation`` does."""
         self.pose[joint] = rotation
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewer.arguments import check_type
 from viewer.rigs.arrays import Floats, Ints, frozen
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 _shaped: Memo[Figure, Figure] = Memo(kept=32)  # maximum number of shapes in use at a time
 
 
-def shaped(figure: Figure, weights: Floats) -> Figure:
+def shaped(figure: Figure, weights: ArrayLike) -> Figure:
     """Return the figure with its blend shapes applied: mesh, normals, joints and bindings.
 
     The last few results are cached, as several passes and panels need the same result.
@@ -94,7 +95,9 @@ def _with_joints(figure: Figure, joints: Floats, shifts: Floats) -> Figure:
     )
 
 
-def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
+def with_rest_mesh(
+    figure: Figure, positions: ArrayLike, normals: ArrayLike | None = None
+) -> Figure:
     """Return the figure with a new rest mesh and the joints regressed from it.
 
     Without a joint regressor, the joints keep their positions. Rest rotations never change.
@@ -119,7 +122,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
     positions = frozen("positions", positions, (mesh.n_vertices, 3))
     normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
-    new_mesh = replace(mesh, positions=positions, normals=normals)
+    new_mesh = replace(mesh, positions=positions, normals=np.asarray(normals))
     if figure.joint_regressor is None or skeleton is None:
         return replace(figure, mesh=new_mesh)
     old, new = rest_joints(figure), regress_joints(figure.joint_regressor, positions)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
@@ -124,7 +125,7 @@ class Clip:
         return Samples(np.ones(len(values), dtype=np.bool_), targets, values)
 
 
-def evaluate(channel: Channel, times: Floats) -> Floats:
+def evaluate(channel: Channel, times: ArrayLike) -> Floats:
     """Return a curve's values: cubic Hermite between the keys, extrapolated outside.
 
     Parameters

@@ -64,6 +64,8 @@ def posed_worlds(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
     """Return ``worlds``; missing ones are computed in one batch and cached in the poses."""
     missing = [pose for pose in poses if not is_posed(skeleton, pose)]
     if missing:
+        for pose in missing:
+            pose.check_fits(skeleton)
         found = worlds(skeleton, pose_arrays(missing))
         for pose, world in zip(missing, found, strict=True):
             pose.posed = PosedSkeleton(skeleton, pose.skinning_key, world)
