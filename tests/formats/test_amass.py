@@ -205,6 +205,23 @@ def test_dance_data_in_a_pickle_is_read(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("turn", "place", "up"),
+    [
+        ((0, 0.4, 0), (0.3, 1.2, 5.0), ""),  # stands along y: estimated from the poses
+        ((np.pi / 2, 0, 0), (0.3, 1.2, 1.2), "z"),  # stands along z
+        ((0, 0.4, 0), (0.3, 4.0, 0.2), "z"),  # lies along y on a ground with z up
+        ((0, 0, np.pi / 2), (0.3, 1.2, 0.2), "z"),  # lies along x
+    ],
+)
+def test_people_who_stand_along_y_do_not_get_z_up(tmp_path, turn, place, up):
+    """Some programs write the layout of AMASS with y up: such people lay on their backs."""
+    poses = np.zeros((3, 156))
+    poses[:, :3] = turn
+    path = saved(tmp_path / "a.npz", **first_release(3, poses=poses, trans=np.tile(place, (3, 1))))
+    assert motion_of(path)[0].up == up
+
+
+@pytest.mark.parametrize(
     ("shape", "names"),
     [((2, 72), SMPL), ((2, 24, 3), SMPL), ((2, 66), SMPL[:22]), ((2, 52, 3), SMPLH)],
 )

@@ -40,6 +40,7 @@ from viewer.formats._source import Source
 from viewer.phrases import counted, listed, one_of
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import SIGNED_UPS, StatedUp
 from viewer.rigs.motion.body_motion import BodyMotion
 from viewer.rigs.motion.timing import Timing
@@ -80,6 +81,9 @@ _KNOWN = {
 _OF_MOTIONS = (*RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
+# Cosine of the mean angle between the pelvis and y of a person who stands along y, and the range of
+# the translation: 0.22 to 0.35 m more than the height of the pelvis, for people of 1.5 to 2 m.
+_ALONG, _STANDING = np.cos(np.radians(30.0)), (0.9, 1.6)
 _SAME = 1e-5  # tolerance in radians or metres: the precision of float32 for numbers below 100
 
 
@@ -141,7 +145,7 @@ def read(source: Source) -> BodyMotion:
         expression=_held(expression, bad),
         hands={side: held_rows(table, bad) for side, table in hands.items()},
         flat_hands=_flag(archive, "flat_hand_mean"),
-        up=_up(archive, is_aist),
+        up=_up(archive, is_aist, vectors[~bad], translations[~bad]),
         shape_space=_shape_space(source, archive, names),
     )
 
@@ -353,7 +357,8 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
     return rows
 
 
-def _up(archive: Archive, is_aist: bool) -> StatedUp:
+def _up(archive: Archive, is_aist: bool, vectors: Floats, translations: Floats) -> StatedUp:
+    """Return the world's up axis; empty if it has to be estimated from the poses."""
     said = archive.plain_text("up")
     for axis in SIGNED_UPS:
         if axis == said:
@@ -362,7 +367,14 @@ def _up(archive: Archive, is_aist: bool) -> StatedUp:
         return "y"
     # EMAGE is y up, although its files do not state it.
     is_speech = any(archive.has(key) for key in _EXPRESSIONS)
-    return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
+    if is_speech or not any(archive.has(key) for key in _OF_AMASS):
+        return ""
+    # Some programs write this layout with y up. A person who lies along y in a world with z up is
+    # hardly ever a standing pelvis away from 0 along y as well.
+    trunks = rotation_vector_to_matrix(vectors[:, 0])[:, 1, 1]
+    low, high = _STANDING
+    stands_along_y = trunks.mean() > _ALONG and low < np.median(translations[:, 1]) < high
+    return "" if stands_along_y else "z"
 
 
 def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> ShapeSpace:
