@@ -5,6 +5,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from formats.gltf.files import File
 from linting.planted import column, moved, weighted, with_normal
 from linting.test_bad_keys import FRAMES, RATE, K, about_z, arm, waving
 from linting.test_bad_rigs import (
@@ -32,6 +33,7 @@ from viewer.linting import (
     lint_files,
     meshes,
     noise,
+    places_of,
     pops,
     spikes,
     stray_weights,
@@ -234,6 +236,37 @@ def test_convert_fixes_and_prints_changes(tmp_path, capsys):
     assert "W001" not in {one.code for one in lint_files(files[2:])[1]}
     assert run(["convert", *files[2:], "-o", str(tmp_path / "again.skel"), "--fix", "W001"]) == 0
     assert "nothing to fix" in capsys.readouterr().out
+
+
+def test_vertex_without_weights_in_gltf_is_named_and_fixed(tmp_path, capsys):
+    """Two triangles: the last corner is beside two that both joints move; its slots name joint 1,
+    and a joint that moves nothing else must not count as one with weights.
+    """
+    file = File()
+    attributes = {
+        "JOINTS_0": file.accessor([[1, 2, 0, 0]] * 3 + [[0, 0, 0, 0]], "B"),
+        "WEIGHTS_0": file.accessor([[1, 0, 0, 0]] + [[0.5, 0.5, 0, 0]] * 2 + [[0, 0, 0, 0]]),
+    }
+    file.mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], **attributes)
+    file.primitive["indices"] = file.accessor([0, 1, 2, 2, 1, 3], "H")
+    names = [{"name": name} for name in ("low", "middle", "high")]
+    file.root["nodes"] = [{"mesh": 0, "skin": 0}, names[0] | {"children": [2]}]
+    file.root["nodes"] += [names[1] | {"children": [3]}, names[2]]
+    file.root |= {"skins": [{"joints": [1, 2, 3]}], "scenes": [{"nodes": [0, 1]}], "scene": 0}
+    bad, good = tmp_path / "bad.glb", tmp_path / "good.glb"
+    bad.write_bytes(file.glb())
+    scene, found = lint_files([bad])
+    (bare,) = (one for one in found if one.code == "W004")
+    assert bare.vertices.tolist() == [3] and bare.pointer.endswith("/attributes/WEIGHTS_0")
+    assert "1 vertex has no weights and follows low" in bare.message
+    np.testing.assert_allclose(places_of(bare, scene).vertices, [[1.0, 1.0, 0.0]])
+    (idle,) = (one for one in found if one.code == "W006")
+    assert idle.joints.tolist() == [0]
+    assert run(["convert", str(bad), "-o", str(good), "--fix", "W004"]) == 0
+    assert "W004 fixed: weights of 1 vertex" in capsys.readouterr().out
+    fixed_scene, left = lint_files([good])
+    assert "W004" not in {one.code for one in left}
+    np.testing.assert_allclose(weights_of(fixed_scene.actors[0].figure)[3], [0.0, 0.5, 0.5])
 
 
 def test_what_cannot_be_fixed_is_said(tmp_path, capsys):

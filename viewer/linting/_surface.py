@@ -10,7 +10,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import Indices, welded
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.skin import Skin, merged, normalized, owners
+from viewer.rigs.skin import Skin, merged, normalized, owners, stated_weights
 
 LEAST = 0.01
 """Smallest weight that is seen."""
@@ -70,7 +70,7 @@ def support_of(figure: Figure) -> Support:
 
 
 def _support(skin: Skin, surface: Surface) -> Support:
-    whole = normalized(merged(skin))
+    whole = normalized(merged(stated_weights(skin)))
     used = np.flatnonzero(whole.weights >= LEAST)
     vertices, joints = owners(whole)[used].astype(np.int64), whole.joints[used].astype(np.int64)
     order = np.argsort(vertices * skin.n_joints + joints, kind="stable")

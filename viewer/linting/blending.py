@@ -17,7 +17,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import edges_of
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import joint_labels
-from viewer.rigs.skin import Skin, merged, normalized, owners, row_norms, skin_rows
+from viewer.rigs.skin import Skin, merged, normalized, owners, row_norms, skin_rows, stated_weights
 
 _TORN = 0.05  # total difference of weights beyond rounding: a gap of 5 % of what the joints move
 _ALL_TORN = 0.5  # fraction of seam vertices above which the parts are separate by design
@@ -53,7 +53,7 @@ def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterat
     if len(copies) == 0:
         return
     copies = copies[_on_seams(mesh, surface)[copies]]
-    whole = normalized(merged(skin))
+    whole = normalized(merged(stated_weights(skin)))
     vertices = owners(whole)
     twins = np.zeros(mesh.n_vertices, dtype=np.bool_)
     twins[copies] = True

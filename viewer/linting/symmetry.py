@@ -28,6 +28,7 @@ from viewer.rigs.skin import (
     normalized,
     owners,
     row_norms,
+    stated_weights,
 )
 
 _MOVED = 1e-3  # minimum displacement that is reported as a note, as a fraction of the figure's size
@@ -133,7 +134,7 @@ def _weights(
 
 def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
     """Return sum over joints of |w(v, j) - w(v', j')| for mirror counterparts v', j': (V,)."""
-    whole = normalized(skin)
+    whole = normalized(stated_weights(skin))
     vertices, joints = owners(whole), whole.joints
     # Each influence, and the reflected influence of the counterpart with a minus sign.
     return row_norms(

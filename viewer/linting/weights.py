@@ -23,6 +23,7 @@ from viewer.rigs.skin import (
     influence_counts,
     merged,
     owners,
+    stated_weights,
 )
 from viewer.rigs.skinning import Skinning, deform
 
@@ -46,7 +47,7 @@ def check(subject: Subject) -> Iterator[Finding]:
 
 
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> Iterator[Finding]:
-    idle = idle_joints(skin, figure.skeleton)
+    idle = idle_joints(stated_weights(skin), figure.skeleton)
     if len(idle) == 0 or subject.lacks("weights"):
         return  # the missing weights may refer to these joints
     labels = [_label(subject, int(joint)) for joint in idle]

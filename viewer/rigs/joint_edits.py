@@ -30,7 +30,7 @@ from viewer.rigs.pose import Pose, dof_rotations, joint_offsets, rest_pose
 from viewer.rigs.retargeting.joint_names import other_side, sided_words
 from viewer.rigs.retargeting.mirror import word_partners
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
-from viewer.rigs.skin import Skin, merged
+from viewer.rigs.skin import merged
 
 _NEAR = 0.02  # distance of a joint from the mirror plane, or from its image, relative to the size
 _ALONG = 1e-6  # sine of the angle up to which a plane's normal counts as a coordinate axis
@@ -336,7 +336,7 @@ def _with_joints(
     owner = np.array(
         [place[heirs.get(joint, joint)] for joint in range(old.n_joints)], dtype=np.int32
     )
-    bound = Skin(skin.starts, owner[skin.joints], skin.weights, inverse, skin.dqs_fractions)
+    bound = replace(skin, joints=owner[skin.joints], inverse_bind=inverse)
     return replace(figure, skeleton=skeleton, skin=merged(bound) if heirs else bound)
 
 

@@ -39,12 +39,17 @@ class Skin:
     dqs_fractions: Floats | None = None
     """(V,) or None. The fraction of dual quaternion skinning that the file asks for at each vertex,
     the rest is linear; None for linear blend skinning."""
+    unweighted: Bools | None = None
+    """(V,) or None. Vertices to which the file gives no weights: the reader attached them to a
+    joint, as other programs do."""
 
     def __post_init__(self) -> None:
         freeze_fields(self, np.int32, starts=(None,), joints=(None,))
         freeze_fields(self, weights=(len(self.joints),), inverse_bind=(None, 4, 4))
         if self.dqs_fractions is not None:
             freeze_fields(self, dqs_fractions=(len(self.starts) - 1,))
+        if self.unweighted is not None:
+            freeze_fields(self, np.bool_, unweighted=(len(self.starts) - 1,))
         counts = np.diff(self.starts)
         if len(self.starts) == 0 or self.starts[0] != 0 or (counts < 0).any():
             raise RigError("starts: expected indices that begin at 0 and never decrease")
@@ -125,6 +130,13 @@ def moves_vertices(skin: Skin) -> Bools:
     return np.bincount(skin.joints[skin.weights > 0.0], minlength=skin.n_joints) > 0
 
 
+def stated_weights(skin: Skin) -> Skin:
+    """Return the skin with weights of 0 at vertices to which the file gives none."""
+    if skin.unweighted is None:
+        return skin
+    return replace(skin, weights=np.where(skin.unweighted[owners(skin)], 0.0, skin.weights))
+
+
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
     """Return joints (N,) without influence; influences of auxiliary ones count for those shown."""
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
@@ -152,9 +164,14 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
     counts = np.diff(skin.starts)[vertices]
     starts = np.concatenate([[0], np.cumsum(counts)])
     index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
-    fractions = None if skin.dqs_fractions is None else skin.dqs_fractions[vertices]
-    chosen = skin.joints[index], skin.weights[index], skin.inverse_bind, fractions
-    return Skin(starts.astype(np.int32), *chosen)
+    return replace(
+        skin,
+        starts=starts.astype(np.int32),
+        joints=skin.joints[index],
+        weights=skin.weights[index],
+        dqs_fractions=None if skin.dqs_fractions is None else skin.dqs_fractions[vertices],
+        unweighted=None if skin.unweighted is None else skin.unweighted[vertices],
+    )
 
 
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
@@ -192,12 +209,11 @@ def limit_influences(skin: Skin, count: int) -> Skin:
     )
     kept = rank < count
     counts = np.bincount(owners(ordered)[kept], minlength=skin.n_vertices)
-    pruned = Skin(
+    pruned = replace(
+        skin,
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         joints=ordered.joints[kept],
         weights=ordered.weights[kept],
-        inverse_bind=skin.inverse_bind,
-        dqs_fractions=skin.dqs_fractions,
     )
     return normalized(pruned)
 
@@ -220,7 +236,7 @@ def merged(skin: Skin) -> Skin:
     found = skin_from_entries(
         skin.n_vertices, unique // skin.n_joints, joints, weights, skin.inverse_bind
     )
-    return replace(found, dqs_fractions=skin.dqs_fractions)
+    return replace(found, dqs_fractions=skin.dqs_fractions, unweighted=skin.unweighted)
 
 
 def owners(skin: Skin) -> Ints:

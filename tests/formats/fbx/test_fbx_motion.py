@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.formats.fbx.contents import target_weights
+from viewer.linting import lint_files
 from viewer.rigs.captures.carried_view import view_in
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.scene import Actor, pose_actors
@@ -154,8 +155,11 @@ def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path):
         "Weights: *4 { a: 0.5,0.5,1,1 }": "Weights: *2 { a: 0.5,0.5 }",
         'C: "OP",52,22, "Lcl Rotation"': 'C: "OP",52,20, "Lcl Rotation"',
     }
-    (actor,) = viewer.load(write_strip(tmp_path, edits=edits)).actors
+    scene = viewer.load(write_strip(tmp_path, edits=edits))
+    (actor,) = scene.actors
     rest = actor.figure.require_mesh().positions
+    (bare,) = (one for one in lint_files(scene.files)[1] if one.code == "W004")
+    assert_allclose(sorted(rest[bare.vertices].tolist()), [[0.0, 2.0, 0.0], [1.0, 2.0, 0.0]])
     moved = posed(actor, 1.0)
     for at, expected in (([1.0, 2.0, 0.0], [-2.0, 1.0, 0.0]), ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])):
         (found, *_) = moved[(rest == at).all(axis=1)]

@@ -323,32 +323,19 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
+    """Record sums of weights that are not 1, located at the first."""
     odd = [piece for piece in pieces if piece.influences.n_deviating]
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)
         most = max(piece.influences.deviation for piece in odd)
+        pointer = odd[0].primitive.pointer
         source.warn(
             "W001.divided: weights of {n} do not sum to 1 (error up to {most}): divided by "
             "their sum",
-            _weights_of(odd[0]),
+            f"{pointer}/attributes/WEIGHTS_0" if pointer else None,
             n=counted(n, "vertex"),
             most=rounded(most, 2),
         )
-    unbound = [piece for piece in pieces if piece.influences.n_unbound]
-    if unbound:
-        n = sum(piece.influences.n_unbound for piece in unbound)
-        source.warn(
-            "W004.first-joint: {n} without weights: attached to the first listed joint",
-            _weights_of(unbound[0]),
-            n=counted(n, "vertex"),
-        )
-
-
-def _weights_of(piece: Piece) -> str | None:
-    """Return the JSON pointer to the weights of a primitive; None if there is none."""
-    pointer = piece.primitive.pointer
-    return f"{pointer}/attributes/WEIGHTS_0" if pointer else None
 
 
 def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.bindings import Bindings
 from viewer.formats._scene_graph.content import NodeFile, Primitive
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.vectors import moved_tangents, unit
 from viewer.rigs.mesh import Mesh, PartView, area_vectors, vertex_normals
 from viewer.rigs.skin import Skin
@@ -43,8 +43,8 @@ class Influences:
     """Largest deviation of a sum of weights from 1 before normalisation."""
     n_deviating: int = 0
     """Number of sums that deviate by more than the rounding of 8-bit weights."""
-    n_unbound: int = 0
-    """Number of vertices without any weight."""
+    unweighted: Bools | None = None
+    """Vertices without any weight, which follow their first slot: (V,); None if there are none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +136,7 @@ def _divided(primitive: Primitive, slots: Ints) -> Influences:
         weights[used],
         float(deviations.max(initial=0.0)),
         int(np.count_nonzero(deviations > rounding)),
-        int(np.count_nonzero(unbound)),
+        unbound if unbound.any() else None,
     )
 
 
@@ -176,7 +176,8 @@ def _of_rows(influences: Influences, rows: Ints) -> Influences:
     firsts = np.concatenate([[0], np.cumsum(counts)])
     index = np.repeat(starts[rows] - firsts[:-1], counts) + np.arange(firsts[-1])
     joints, weights = influences.joints[index], influences.weights[index]
-    return replace(influences, counts=counts, joints=joints, weights=weights)
+    lone = None if influences.unweighted is None else influences.unweighted[rows]
+    return replace(influences, counts=counts, joints=joints, weights=weights, unweighted=lone)
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
@@ -274,6 +275,9 @@ def _filled(pieces: list[Piece], given: Sequence[Floats | None], neutral: Floats
 def skin_of(file: NodeFile, pieces: list[Piece], inverse_bind: Floats) -> Skin:
     """Return the skin of a figure."""
     fractions = np.concatenate([_dqs_fractions(file, piece) for piece in pieces])
+    none = [np.zeros(piece.n_vertices, dtype=np.bool_) for piece in pieces]
+    lone = [piece.influences.unweighted for piece in pieces]
+    unweighted = np.concatenate([b if a is None else a for a, b in zip(lone, none, strict=True)])
     counts = np.concatenate([piece.influences.counts for piece in pieces])
     return Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
@@ -281,6 +285,7 @@ def skin_of(file: NodeFile, pieces: list[Piece], inverse_bind: Floats) -> Skin:
         weights=np.concatenate([piece.influences.weights for piece in pieces]),
         inverse_bind=inverse_bind,
         dqs_fractions=fractions if fractions.any() else None,
+        unweighted=unweighted if unweighted.any() else None,
     )
 
 

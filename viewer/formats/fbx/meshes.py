@@ -13,7 +13,7 @@ from viewer.formats._polygons import triangulate
 from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeSkin, Primitive
 from viewer.formats._source import Source
 from viewer.formats.fbx.message import Arrays
-from viewer.phrases import agree, counted, quoted
+from viewer.phrases import counted, quoted
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.file_record import Json
 
@@ -153,10 +153,10 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
     vertices, weights = get("vertices"), get("weights")
     used = kept[cluster] & (weights != 0.0)
     cluster, vertices, weights = cluster[used], vertices[used], weights[used]
-    # The last joint is the node of the mesh; see ``on_nodes``.
+    # Vertices without weights follow their first slot: the node of the mesh; see ``on_nodes``.
     alone = _without_weights(arrays, placed.prefix)
     vertices = np.concatenate([vertices, alone])
-    weights = np.concatenate([weights, np.ones(len(alone))])
+    weights = np.concatenate([weights, np.zeros(len(alone))])
     slots = np.concatenate([numbers[cluster], np.full(len(alone), kept.sum())])
     order = np.argsort(vertices, kind="stable")
     slots, vertices, weights = slots[order], vertices[order], weights[order]
@@ -226,15 +226,6 @@ def skin_of(source: Source, arrays: Arrays, prefix: str, told: Json) -> NodeSkin
         )
     if not kept.any():
         return None
-    alone = len(_without_weights(arrays, prefix))
-    if alone:
-        source.warn(
-            "W004.mesh-node: mesh {mesh}: {n} without weights {follow} the node of the mesh "
-            "instead of a joint",
-            mesh=quoted(told["name"]),
-            n=counted(alone, "vertex"),
-            follow=agree(alone, "follows", "follow"),
-        )
     return NodeSkin(
         told["skin"]["name"], get("bones")[kept], get("matrices")[kept], told["skin"]["method"]
     )

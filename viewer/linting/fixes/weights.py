@@ -175,7 +175,8 @@ def _with_rows(
         np.concatenate([skin.weights[kept], rows.weights]),
         skin.inverse_bind,
     )
-    return normalized(replace(found, dqs_fractions=skin.dqs_fractions))
+    unweighted = None if skin.unweighted is None else skin.unweighted & ~changed
+    return normalized(replace(found, dqs_fractions=skin.dqs_fractions, unweighted=unweighted))
 
 
 def _around(surface: Surface, vertices: Indices) -> Indices:

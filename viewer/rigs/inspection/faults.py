@@ -91,6 +91,8 @@ def weight_faults(figure: Figure, invalid: Invalid) -> Iterator[Fault]:
     bare = known & ~moved
     if bare.any():
         yield from _bare(mesh, bare)
+    if skin.unweighted is not None:
+        yield from _attached(figure, skin, np.flatnonzero(skin.unweighted))
 
 
 def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
@@ -176,6 +178,22 @@ def _bare(mesh: Mesh, bare: Bools) -> Iterator[Fault]:
             "W004.vertices: {n} no influence and {stay} in the bind pose (first: vertex {vertex})"
         )
         yield Fault(message, ("weights", first), values, single)
+
+
+def _attached(figure: Figure, skin: Skin, vertices: Indices) -> Iterator[Fault]:
+    """Yield vertices that move with a joint only because the file gives them no weights."""
+    if len(vertices) == 0:
+        return
+    first = int(vertices[0])
+    joints = distinct(skin.joints[np.isin(owners(skin), vertices)])
+    values = {
+        "n": counted(len(vertices), "vertex", "has", "have"),
+        "follow": agree(len(vertices), "follows", "follow"),
+        "names": listed(_labels(figure, joints)),
+        "vertex": first,
+    }
+    message = "W004.attached: {n} no weights and {follow} {names} (first: vertex {vertex})"
+    yield Fault(message, ("weights", first), values, vertices)
 
 
 def are_singular(matrices: Floats) -> Bools:
