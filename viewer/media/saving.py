@@ -8,6 +8,7 @@ import stat
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
+from typing import IO
 
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
@@ -112,14 +113,21 @@ def save_parts(
                 for part in parts:
                     stream.write(part)
         else:
-            _replace(path.resolve(), parts, stat.S_IMODE(mode))
-            note_output(path)
+            file = Replacement(path)
+            try:
+                with file.open() as stream:
+                    for part in parts:
+                        stream.write(part)
+                file.commit()
+            except BaseException:  # including Ctrl-C: the temporary file must not be left behind
+                file.discard()
+                raise
     except (OSError, ValueError, RuntimeError) as problem:
         raise OutputError.at(path, problem) from None
 
 
 class Replacement:
-    """A file that a library writes by name: a temporary file next to the target, then renamed."""
+    """A temporary file next to its target, which it then replaces."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -139,33 +147,37 @@ class Replacement:
         """Return a one-line error with the path."""
         return OutputError.at(self.path, problem)
 
-    def begin(self) -> Path:
-        """Create the temporary file, with the target's suffix, and return its path."""
+    def open(self, ends_like_target: bool = False) -> IO[bytes]:
+        """Create the temporary file and open it."""
         import tempfile
 
-        target = self._target
+        folder, name = self._target.parent, self._target.name
+        suffix = self._target.suffix if ends_like_target else ""
         try:
-            handle, name = tempfile.mkstemp(
-                dir=target.parent,
-                prefix=new_prefix(target.parent, target.stem),
-                suffix=target.suffix,
-            )
+            prefix = new_prefix(folder, name.removesuffix(suffix))
+            handle, name = tempfile.mkstemp(dir=folder, prefix=prefix, suffix=suffix)
+            self.temporary = Path(name)
+            note_unfinished(self.temporary)
+            return os.fdopen(handle, "wb")
         except OSError as problem:
+            self.discard()
             raise self.error(problem) from None
-        os.close(handle)
-        self.temporary = Path(name)
-        note_unfinished(self.temporary)
-        return self.temporary
 
-    def commit(self) -> int:
+    def begin(self) -> Path:
+        """Create the temporary file for a library that opens it by its name, and return that."""
+        with self.open(ends_like_target=True):
+            assert self.temporary is not None
+            return self.temporary
+
+    def commit(self, in_any_thread: bool = False) -> int:
         """Replace the target with the temporary file; return its size in bytes."""
         assert self.temporary is not None  # created by begin()
-        poll(in_any_thread=True)  # as in _replace, but this is the encoder's thread
         try:
             with self.temporary.open("rb+") as stream:
                 os.fsync(stream.fileno())
             size = self.temporary.stat().st_size
             self.temporary.chmod(self._permissions)
+            poll(in_any_thread)  # the last point at which a signal can stop the write
             self.temporary.replace(self._target)
         except OSError as problem:
             self.discard()
@@ -252,29 +264,6 @@ def _mode(target: Path) -> int:
         mask = os.umask(0)
         os.umask(mask)
         return stat.S_IFREG | (0o666 & ~mask)
-
-
-def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
-    import tempfile
-
-    _require_folder(target)
-    handle, name = tempfile.mkstemp(
-        dir=target.parent, prefix=new_prefix(target.parent, target.name)
-    )
-    note_unfinished(Path(name))
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            for part in parts:
-                stream.write(part)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(name).chmod(permissions)
-        poll()  # the last point at which a signal can stop the write
-        Path(name).replace(target)
-    except BaseException:  # including Ctrl-C: the temporary file must not be left behind
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
 
 
 def _reported(parts: Iterable[bytes], name: str, n_lines: int) -> Iterator[bytes]:

@@ -130,7 +130,7 @@ class VideoSink:
             self._container.close()
             self._output.finish()
         self._container = None
-        self.n_bytes = self._file.commit()
+        self.n_bytes = self._file.commit(in_any_thread=True)
 
     def abort(self) -> None:
         """Remove the unfinished file."""
