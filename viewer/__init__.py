@@ -38,8 +38,7 @@ if TYPE_CHECKING:
     from viewer.commands._exports import export
     from viewer.commands._pictures import render, video
     from viewer.commands._retarget import retarget
-    from viewer.commands._show import show
-    from viewer.commands._widget import widget
+    from viewer.commands._show import show, widget
     from viewer.commands.diff import Comparison, diff
     from viewer.commands.lint import Findings, lint
     from viewer.commands.rig import rig
@@ -178,7 +177,7 @@ _HOMES = {
     "shaped": "rigs.shape",
     "show": "commands._show",
     "video": "commands._pictures",
-    "widget": "commands._widget",
+    "widget": "commands._show",
     "with_rest_mesh": "rigs.shape",
     "write": "formats",
 }

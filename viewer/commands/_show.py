@@ -1,4 +1,7 @@
-"""``viewer.show``: a window of a Python program, in this process or in another one."""
+"""``viewer.show`` and ``viewer.widget``: a scene of a Python program in a window or a notebook.
+
+Both load what they need when they are called.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,15 @@ from types import NoneType
 from typing import TYPE_CHECKING, Literal, overload
 
 from viewer.arguments import check_type
+from viewer.errors import ViewerError
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.scene import Actor, Scene, scene_of
+from viewer.rigs.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.live.program import Window
+    from viewer.notebook_widget import SceneWidget
 
 
 @overload
@@ -76,3 +82,40 @@ def show(
 
     show_window(found, camera, options)
     return None
+
+
+def widget(
+    scene: Scene | Actor, skinning: Skinning | None = None, *, height: int = 420
+) -> SceneWidget:
+    """Show a scene in a notebook, and follow its poses, its time, its camera and its selection.
+
+    Parameters
+    ----------
+    scene
+        What is shown, with its motions.
+    skinning
+        Skinning method and options.
+    height
+        Height of the view, pixels.
+
+    Returns
+    -------
+    SceneWidget
+        The widget, as the last expression of a cell. ``widget["name"].pose = pose`` shows a pose
+        at once; ``time``, ``camera`` and ``selection`` can be set and read.
+
+    Raises
+    ------
+    ViewerError
+        If the package anywidget is not installed.
+    """
+    try:
+        from viewer.notebook_widget import SceneWidget
+    except ModuleNotFoundError as missing:
+        raise ViewerError(
+            f"viewer.widget: expected the package anywidget, found no {missing.name}: "
+            "pip install 'skinning-viewer[notebook]'"
+        ) from missing
+    check_type("skinning", skinning, Skinning, NoneType)
+    check_type("height", height, int)
+    return SceneWidget(scene_of(scene, "widget"), skinning, height)

@@ -17,9 +17,9 @@ import viewer
 from viewer.batching.items import Item, Result
 from viewer.cli import run
 from viewer.commands import _progress
-from viewer.commands._batch import display
+from viewer.commands import batch as batch_command
 from viewer.commands._batch.calling import identity_of
-from viewer.commands._batch.display import Display
+from viewer.commands.batch import Display
 from viewer.commands._batch.planning import Request, plan_of
 from viewer.commands._input_files import input_files
 from viewer.errors import ViewerError
@@ -43,7 +43,7 @@ def shown(monkeypatch, is_terminal, statuses):
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.setattr(display, "time", clock)
+    monkeypatch.setattr(batch_command, "time", clock)
     monkeypatch.setattr(_progress, "time", clock)
     if is_terminal:
         bar = _progress._bar()
@@ -77,8 +77,8 @@ def test_lines_without_a_terminal_have_rate_and_time_left(monkeypatch):
 
 def test_rate_is_that_of_the_last_minute(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(display, "time", clock)
-    rate = display._Rate()
+    monkeypatch.setattr(batch_command, "time", clock)
+    rate = batch_command._Rate()
     for count in range(1, 101):
         clock.now += 10.0
         slow = rate.at(count)
