@@ -7,7 +7,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.topology import Indices, welded
+from viewer.rigs.geometry.topology import Indices, sides_of, welded
 from viewer.rigs.memo import Memo
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skin import Skin, merged, normalized, owners, stated_weights
@@ -39,7 +39,7 @@ def surface_of(figure: Figure) -> Surface:
 def _surface(mesh: Mesh) -> Surface:
     place = welded(mesh.positions, np.arange(mesh.n_vertices, dtype=np.int32))
     corners = place[mesh.triangles]
-    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    start, end = sides_of(corners).reshape(-1, 2).T
     count = np.int64(max(mesh.n_vertices, 1))
     keys = np.unique(np.concatenate([start * count + end, end * count + start]))
     edges = np.stack(np.divmod(keys, count), axis=1)

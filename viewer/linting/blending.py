@@ -14,7 +14,7 @@ from viewer.linting._surface import FEWEST, Support, Surface, support_of, surfac
 from viewer.phrases import counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.topology import edges_of
+from viewer.rigs.geometry.topology import edges_of, sides_of
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.skin import Skin, merged, normalized, owners, row_norms, skin_rows, stated_weights
@@ -95,7 +95,7 @@ def _on_seams(mesh: Mesh, surface: Surface) -> Bools:
     is_border = edges_of(corners).counts == 1
     is_seam = is_border & (edges_of(surface.place[corners]).counts == 2)
     result = np.zeros(mesh.n_vertices, dtype=np.bool_)
-    result[corners.ravel()[is_seam]] = result[np.roll(corners, -1, axis=1).ravel()[is_seam]] = True
+    result[sides_of(corners).reshape(-1, 2)[is_seam]] = True
     return result
 
 

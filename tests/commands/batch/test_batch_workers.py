@@ -19,9 +19,9 @@ from viewer.cli import run
 from viewer.commands import _progress
 from viewer.commands import batch as batch_command
 from viewer.commands._batch.calling import identity_of
-from viewer.commands.batch import Display
 from viewer.commands._batch.planning import Request, plan_of
 from viewer.commands._input_files import input_files
+from viewer.commands.batch import Display
 from viewer.errors import ViewerError
 
 ITEMS = [Item(index, (), "", f"{index}.anim") for index in range(100)]

@@ -14,6 +14,7 @@ from viewer.linting import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rigs.arrays import Floats
+from viewer.rigs.geometry.topology import sides_of
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.scene import actor_points
 
@@ -73,14 +74,13 @@ def marks_of(places: Places) -> tuple[Marks, str]:
     vertices, joints = _finite(places.vertices), _finite(places.joints)
     triangles = _finite(places.triangles)
     shown = triangles[: _MOST // 3]
-    edges = np.stack([shown, np.roll(shown, -1, axis=1)], axis=2)
     middles = shown.mean(axis=1) if len(shown) <= _FEW else np.zeros((0, 3))
     parts = (vertices[:_MOST], middles, joints[:_MOST])
     radii = (_radius(len(parts[0])), _MIDDLE, _JOINT)
     marks = Marks(
         np.concatenate(parts),
         np.concatenate([np.full(len(part), r) for part, r in zip(parts, radii, strict=True)]),
-        edges.reshape(-1, 2, 3),
+        sides_of(shown).reshape(-1, 2, 3),
     )
     cut = [
         f"the worst {marked:,} of {count:,} {what} are marked"

@@ -16,7 +16,7 @@ from viewer.app.posing.posed_joint import Orientation, PosedJoint
 from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats
-from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
+from viewer.rigs.geometry.rotation import nearest_angles, rotation_vector_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.number_text import angle_text
 from viewer.rigs.pose import Pose, joint_rotations
@@ -138,7 +138,7 @@ class RotateHandle:
         angle = self._turned(frame, place)
         if angle is not None:
             # Several revolutions are possible: take the equivalent angle nearest to the last one.
-            self._angle = angle - 2 * math.pi * round((angle - self._angle) / (2 * math.pi))
+            self._angle = float(nearest_angles(angle, self._angle))
         turn = SNAP * round(self._angle / SNAP) if snaps else self._angle
         if self.ring.dof >= 0:
             return self._one_dof(turn)

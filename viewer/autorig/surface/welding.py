@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
-from viewer.rigs.geometry.topology import Indices, components, welded
+from viewer.rigs.geometry.topology import Indices, components, sides_of, welded
 from viewer.rigs.mesh import side_lengths, triangle_areas
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
@@ -102,7 +102,7 @@ def stiff_islands(mesh: Welded) -> Bools:
 
 def edges(triangles: Ints) -> Ints:
     """Return the undirected edges of triangles, each once: (E, 2) int32, lower index first."""
-    corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    corners = sides_of(triangles).reshape(-1, 2)
     low, high = corners.min(axis=1), corners.max(axis=1)
     width = int(corners.max(initial=0)) + 1
     keys = low[low != high].astype(np.int64) * width + high[low != high]

@@ -16,6 +16,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import (
     matrix_to_euler,
     matrix_to_quaternion,
+    nearest_angles,
     quaternion_to_matrix,
 )
 from viewer.rigs.geometry.vectors import Up
@@ -233,7 +234,7 @@ def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
     first = matrix_to_euler(rotations)
     # (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
     other = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
-    other -= 2.0 * np.pi * np.round(other / (2.0 * np.pi))
+    other = nearest_angles(other, 0.0)
     excess = [
         (np.maximum(low - angles, 0.0) + np.maximum(angles - high, 0.0)).sum(axis=1)
         for angles in (first, other)

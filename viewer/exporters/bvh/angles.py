@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.exporters._options import RotationOrder
 from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.geometry.rotation import TURN, nearest_angles
 
-_WHOLE = 2.0 * np.pi  # radians in a revolution
 _BLOCK = 256  # frames
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
 
@@ -67,24 +67,24 @@ class Unroller:
         angles = self._unlocked(angles)
         chosen = self._nearest_form(angles)
         before = np.concatenate([self._chosen[None], chosen[:-1]])
-        turns = np.cumsum(_revolutions(chosen - before), axis=0)
+        turns = np.cumsum(np.rint((chosen - before) / TURN), axis=0)
         turns += self._turns
         # Copies: views would keep the whole motion in memory.
         self._chosen, self._turns = chosen[-1].copy(), turns[-1]
-        return chosen - _WHOLE * turns
+        return chosen - TURN * turns
 
     def _nearest_form(self, angles: Floats) -> Floats:
         """Switch to the other form of a rotation where it is nearer to the previous frame."""
         before = np.concatenate([self._last[None], angles[:-1]])
         self._last = angles[-1].copy()
-        stay = np.abs(_wrapped(angles - before)).sum(axis=-1)
+        stay = np.abs(nearest_angles(angles, before) - before).sum(axis=-1)
         # The distance to the other form is at least 2 pi - stay.
         if (stay < np.pi).all() and not self._is_other.any():
             return angles
         # (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation.
         other = angles * [1.0, -1.0, 1.0] + np.pi
         # Switching costs the same from either form, so the number of switches accumulates.
-        switches = np.abs(_wrapped(other - before)).sum(axis=-1) < stay - 1e-9
+        switches = np.abs(nearest_angles(other, before) - before).sum(axis=-1) < stay - 1e-9
         switches[0] ^= self._is_other
         changed = np.logical_xor.accumulate(switches, axis=0)
         self._is_other = changed[-1]
@@ -109,15 +109,6 @@ class Unroller:
         sign = self._sign * np.sign(angles[..., 1])
         result[..., 2] += np.where(locked, sign * (angles[..., 0] - first), 0.0)
         return result
-
-
-def _revolutions(angles: Floats) -> Floats:
-    """Return the nearest whole numbers of revolutions."""
-    return np.rint(angles / _WHOLE)
-
-
-def _wrapped(angles: Floats) -> Floats:
-    return angles - _WHOLE * _revolutions(angles)
 
 
 def _sign(order: RotationOrder) -> float:

@@ -12,6 +12,9 @@ import numpy as np
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.geometry.quaternion import quaternion_to_rotation_vector
 
+TURN = 2.0 * np.pi
+"""Radians in a revolution."""
+
 _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
 
 
@@ -121,6 +124,11 @@ def matrix_to_euler(matrices: Floats) -> Floats:
         sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
     )
     return np.stack([x, y, z], axis=-1) + 0.0
+
+
+def nearest_angles(angles: Floats | float, wanted: Floats | float) -> Floats:
+    """Return the angles, plus multiples of 2 pi, that are nearest to the wanted ones, radians."""
+    return np.asarray(angles - TURN * np.rint((angles - wanted) / TURN))
 
 
 def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:

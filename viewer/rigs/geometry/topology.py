@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, Item
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skin import Skin, skin_rows
 
@@ -60,10 +60,14 @@ class Edges:
     neighbours do."""
 
 
+def sides_of(corners: NDArray[Item]) -> NDArray[Item]:
+    """Return the two ends of each side of triangles (T, 3, ...), in order: (T, 3, 2, ...)."""
+    return np.stack([corners, np.roll(corners, -1, axis=1)], axis=2)
+
+
 def edges_of(corners: Ints | Indices) -> Edges:
     """Return the edges of triangles (T, 3); pairs exclude those between equal vertices."""
-    start = corners.ravel().astype(np.int64)
-    end = np.roll(corners, -1, axis=1).ravel().astype(np.int64)
+    start, end = sides_of(corners).reshape(-1, 2).T.astype(np.int64)
     base = int(start.max(initial=0)) + 1
     keys = np.minimum(start, end) * base + np.maximum(start, end)
     forward = start < end

@@ -8,7 +8,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.topology import edges_of, welded
+from viewer.rigs.geometry.topology import edges_of, sides_of, welded
 from viewer.rigs.mesh import bounding_box, triangle_areas, volume
 
 DENSITY = 985.0
@@ -58,5 +58,4 @@ def _open_edges(positions: Floats, triangles: Ints) -> Ints:
     if is_open.any():
         # Vertices are often duplicated along texture seams.
         is_open = edges_of(welded(positions, triangles)).counts == 1
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
-    return ends.reshape(-1, 2)[is_open]
+    return sides_of(triangles).reshape(-1, 2)[is_open]

@@ -17,14 +17,19 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Floats, Ints
-from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
+from viewer.rigs.geometry.rotation import (
+    TURN,
+    axis_rotations,
+    matrix_to_euler,
+    nearest_angles,
+    quaternion_to_matrix,
+)
 from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 _SWEEPS = 200
 _STILL = 1e-10  # largest change in the last sweep, radians
 _ROUNDING = 1e-9  # tolerance in radians for a value that exceeds its limit
-_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,10 +131,10 @@ class _Solver:
 
     def _wrapped(self, values: Floats) -> Floats:
         """Add multiples of 2 pi: nearest to the current values, within the limits if possible."""
-        near = values - _TURN * np.round((values - self.present) / _TURN)
-        inside = near - _TURN * np.round((near - np.clip(near, self.low, self.high)) / _TURN)
+        near = nearest_angles(values, self.present)
+        inside = nearest_angles(near, np.clip(near, self.low, self.high))
         # A range that crosses -pi or pi may contain the value one full rotation away.
-        for shift in (-_TURN, _TURN):
+        for shift in (-TURN, TURN):
             moved = near + shift
             inside = np.where((moved >= self.low) & (moved <= self.high), moved, inside)
         is_inside = (near >= self.low - _ROUNDING) & (near <= self.high + _ROUNDING)
@@ -160,9 +165,9 @@ class _Solver:
             return now  # all angles are equally suitable
         # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
-        top -= _TURN * round((top - now) / _TURN)
+        top -= TURN * round((top - now) / TURN)
         low, high = float(self.low[place]), float(self.high[place])
-        for candidate in (top, top - _TURN, top + _TURN):
+        for candidate in (top, top - TURN, top + TURN):
             if low <= candidate <= high:
                 return candidate
         return low if math.cos(low - top) >= math.cos(high - top) else high
