@@ -26,7 +26,6 @@ _WORST_CONDITION = 1e5  # maximum condition number of an inverse bind matrix tha
 # Quantised attributes: largest values of normalised integers
 EXTENSION = "KHR_mesh_quantization"
 _SHORT, _WORD, _BYTE = 32767, 65535, 255
-_Integers = NDArray[np.integer]
 
 
 def add_mesh(
