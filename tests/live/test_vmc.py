@@ -305,6 +305,27 @@ def test_random_packets_are_counted_and_need_bounded_memory():
     assert len(receiver._pending) <= 500
 
 
+def test_expressions_of_several_performers_are_kept_in_bounded_memory():
+    rules = ExpressionRules([1, 2], [False] * 2, [-1] * 2, [[0, 0, 0]] * 2, ("happy", "aa"))
+    shapes = BlendShapes(("nose", "Smile", "A"), np.ones((3, 3, 3)), ("morph",) * 3, rules=rules)
+    figure = replace(dummy()[0], blend_shapes=shapes)
+    receiver, actor = Receiver("127.0.0.1", 0), viewer.Actor(figure)
+    actor.pose.shape_weights[0] = 0.25  # by the user
+    how = t_pose(figure)
+    for name, weight in (("Joy", 0.75), ("aa", 0.5), ("happy", 1.0)):
+        receiver.receive(osc("/VMC/Ext/Blend/Val", name, weight))
+        receiver.receive(osc("/VMC/Ext/Blend/Apply"))
+        actor.pose = perform(how, actor.pose, receiver.take())
+    assert actor.pose.shape_weights.tolist() == [0.25, 1.0, 0.5]
+    for number in range(1200):
+        receiver.receive(osc("/VMC/Ext/Blend/Val", f"shape {number}", 0.5))
+        receiver.receive(osc("/VMC/Ext/Blend/Apply"))
+    given = receiver.take().expressions
+    receiver.close()
+    assert len(given) == 500
+    assert "shape 1199" in given
+
+
 def test_window_is_moved_by_a_performer_and_shows_the_counts(tmp_path):
     figure, matrix = dummy("z up")
     scene = viewer.Scene([viewer.load()[0], viewer.Actor(figure)])  # the fox is no humanoid

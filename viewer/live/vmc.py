@@ -49,7 +49,7 @@ from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_ma
 from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES
 from viewer.rigs.kinematics import posed_skeleton, world_matrices
 from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, set_joint_rotations
-from viewer.rigs.retargeting.retarget import expression_weights
+from viewer.rigs.retargeting.retarget import expression_columns
 from viewer.rigs.shape import shaped_skeleton
 from viewer.rigs.units import METRES
 
@@ -182,9 +182,12 @@ def _after(
             if len(pending) > _MOST_EXPRESSIONS:
                 raise OscError(f"expected at most {_MOST_EXPRESSIONS} expressions")
         case "/VMC/Ext/Blend/Apply":
-            given = dict(pending)
+            # Another program may send the other expressions. The latest are last: they win over
+            # the same one by another name, and stay if there are too many.
+            kept = {name: now.expressions[name] for name in now.expressions if name not in pending}
+            given = [*kept.items(), *pending.items()][-_MOST_EXPRESSIONS:]
             pending.clear()
-            return replace(now, expressions=given)
+            return replace(now, expressions=dict(given))
         case "/VMC/Ext/OK":
             is_loaded = bool(arguments) and arguments[0] == 1
             return now if is_loaded == now.is_loaded else replace(now, is_loaded=is_loaded)
@@ -271,7 +274,7 @@ def t_pose(figure: Figure) -> TPose:
 
 
 def perform(how: TPose, pose: Pose, given: Performance) -> Pose:
-    """Return a pose with the bones and expressions of a performance; other joints stay."""
+    """Return a pose with the bones and expressions of a performance; others stay."""
     figure, posed = how.figure, pose.copy()
     skeleton = shaped_skeleton(figure, pose.shape_weights)
     turned = {"": given.root.rotation}
@@ -293,11 +296,9 @@ def perform(how: TPose, pose: Pose, given: Performance) -> Pose:
         set_joint_rotations(skeleton, posed, moved, local[moved], "quaternion")
     if "hips" in given.bones:
         _place_hips(how, posed, given)
-    if given.expressions:
-        values = {name: np.array([weight]) for name, weight in given.expressions.items()}
-        weights, _ = expression_weights(values, figure)
-        if weights is not None:
-            posed.shape_weights = weights[0]
+    for name, column in expression_columns(given.expressions, figure).items():
+        if column < len(posed.shape_weights):  # a program may send fewer
+            posed.shape_weights[column] = given.expressions[name]
     return posed
 
 

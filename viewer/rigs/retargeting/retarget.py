@@ -12,7 +12,7 @@ to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -396,15 +396,7 @@ def expression_weights(
     expressions: Mapping[str, Floats], figure: Figure
 ) -> tuple[Floats | None, list[Diagnostic]]:
     """Return blend shape weights (N, S), None if none moves, and notes on missing expressions."""
-    shapes = figure.blend_shapes
-    names = () if shapes is None else shapes.names
-    # Expressions come after the morph targets, whose names they may share.
-    columns = {_plain(name): column for column, name in enumerate(names)}
-    rules = None if shapes is None else shapes.rules
-    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
-        if preset:
-            columns[_plain(preset)] = int(row)
-    found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
+    found = expression_columns(expressions, figure)
     missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
     notes = (
         [
@@ -423,6 +415,19 @@ def expression_weights(
     for name, column in found.items():
         weights[:, column] = expressions[name]
     return weights, notes
+
+
+def expression_columns(names: Iterable[str], figure: Figure) -> dict[str, int]:
+    """Return the blend shapes of expressions that a figure has, by their names in VRM 0 or 1."""
+    shapes = figure.blend_shapes
+    own = () if shapes is None else shapes.names
+    # Expressions come after the morph targets, whose names they may share.
+    columns = {_plain(name): column for column, name in enumerate(own)}
+    rules = None if shapes is None else shapes.rules
+    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
+        if preset:
+            columns[_plain(preset)] = int(row)
+    return {name: columns[_plain(name)] for name in names if _plain(name) in columns}
 
 
 def _plain(name: str) -> str:
