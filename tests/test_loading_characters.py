@@ -257,6 +257,46 @@ def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
     assert_allclose(paths[1], legs[1] / legs[0] * np.array(forward), rtol=0, atol=1e-3)
 
 
+def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tmp_path):
+    """The clip used to move only its own skeleton, with a note that --model has no effect."""
+    hero, skel, anim = tmp_path / "hero.glb", tmp_path / "a.skel", tmp_path / "a.anim"
+    hero.write_bytes(character_of(RIGGED).glb())
+    # The same hierarchy in half the size, whose root moves by 1 along z and whose left thigh swings
+    # by a right angle about x, both within a second.
+    lines, depth = [], 0
+    for line in RIGGED.strip("\n").split("\n"):
+        deep = len(line) - len(line.lstrip())
+        lines += ["}"] * (depth - deep)
+        name, *offset = line.split()
+        lines.append(f"balljoint {name} {{ offset {' '.join(f'{float(x) / 2}' for x in offset)}")
+        depth = deep + 1
+    skel.write_text("\n".join([*lines, "}" * depth]))
+    names = [line.split()[0] for line in RIGGED.strip("\n").split("\n")]
+    ends = np.zeros(3 + 3 * len(names))
+    ends[2], ends[3 + 3 * names.index("left_hip")] = 1.0, -np.pi / 2
+    channels = "".join(
+        f"channel {{ extrapolate constant constant keys 2 {{ 0 0 linear linear 1 {end} linear "
+        "linear } }\n"
+        for end in ends
+    )
+    anim.write_text(f"animation {{ range 0 1 numchannels {len(ends)}\n{channels} }}")
+    settings = MotionSettings(model=hero, feet=False)
+    (actor,) = load(skel, anim, motion=settings).actors
+    assert actor.figure.name == "hero"
+    places = []
+    for time in (0.0, 1.0):
+        pose_actors([actor], time)
+        joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+        places.append([joints[actor.figure.skeleton.names.index(name)] for name in names])
+    start, end = (dict(zip(names, each, strict=True)) for each in places)
+    assert_allclose(end["pelvis"] - start["pelvis"], [0, 0, 2], rtol=0, atol=1e-9)
+    assert_allclose(start["left_knee"] - start["left_hip"], [0, -1, 0], rtol=0, atol=1e-9)
+    # Rx(-90) (0, -1, 0) = (0, 0, 1)
+    assert_allclose(end["left_knee"] - end["left_hip"], [0, 0, 1], rtol=0, atol=1e-9)
+    beside = load(skel, anim, motion=replace(settings, drives=False))
+    assert [each.figure.name for each in beside.actors] == ["a"]
+
+
 @pytest.mark.parametrize("is_named", [False, True])
 def test_fingers_of_smplh_drive_those_of_a_character(is_named, tmp_path):
     """The bundled body has no fingers, so they used to stay at rest."""

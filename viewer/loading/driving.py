@@ -40,8 +40,10 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rigs.motion.clip import Clip, misfit, suits
+from viewer.rigs.motion.sampled_animation import baked
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.motion.timing import DEFAULT_RATE
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.joint_names import joint_meanings
@@ -56,9 +58,15 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     for path, clip in contents.clips:
         _give_clip(path, clip, draft, contents)
         draft.note_motions(path)
-    drives = bool(contents.skeleton_motions) and settings.drives
+    # With captured bodies, --model is the model that shows them.
+    has_bodies = bool(contents.body_motions or contents.captures)
+    bare = [] if has_bodies else [actor for actor in draft.actors if _is_bare_clip(actor)]
+    drives = bool(contents.skeleton_motions or bare) and settings.drives
     models = BodyModels(draft, settings)
     named = models.named("") if drives else None
+    if named is not None:
+        for actor in bare:
+            _drive_by_clip(actor, draft, settings, named)
     if settings.model is not None and named is None and contents.skeleton_motions:
         draft.note(
             "F007.model-beside: --model {model}: no motion is applied to it with --beside",
@@ -117,6 +125,24 @@ def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) ->
         skeleton=owner,
         misfit=misfit(clip, first),
     )
+
+
+def _is_bare_clip(actor: Actor) -> bool:
+    """Return whether an actor is a skeleton without a mesh that plays a clip of its own."""
+    return isinstance(actor.clip, Clip) and actor.figure.mesh is None
+
+
+def _drive_by_clip(
+    actor: Actor, draft: SceneDraft, settings: MotionSettings, model: Figure
+) -> None:
+    """Let a skeleton's clip move the requested model, as a BVH file does."""
+    figure, clip = actor.figure, actor.clip
+    assert isinstance(clip, Clip)  # as of _is_bare_clip
+    moving = Figure(figure.name, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
+    motion = SkeletonMotion(moving, baked(figure, clip, settings.frame_rate or DEFAULT_RATE))
+    draft.take(next(index for index, other in enumerate(draft.actors) if other is actor))
+    path = Path(figure.name) if actor.clip_origin is None else actor.clip_origin[0]
+    give_skeleton_motion(path, motion, draft, settings, model)
 
 
 def _give_body_motion(

@@ -153,10 +153,11 @@ def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
 
 
 def baked(
-    figure: Figure, clip: TransformClip, rate: float | None = None, base: Pose | None = None
+    figure: Figure, clip: Clip | TransformClip, rate: float | None = None, base: Pose | None = None
 ) -> SampledClip:
-    """Return poses from start to the last whole frame; ``rate``: the keys' if omitted."""
-    rate = clip.frame_rate if rate is None else rate
+    """Return poses from start to the last whole frame; ``rate``: that of the keys if omitted."""
+    if rate is None:
+        rate = DEFAULT_RATE if isinstance(clip, Clip) else clip.frame_rate
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(figure, clip, times, base)
     return SampledClip(
