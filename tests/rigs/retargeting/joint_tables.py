@@ -199,6 +199,222 @@ JAPANESE = """
     左つま先 = left_foot
  右太もも = right_hip
 """
+FRENCH = """
+Bassin = pelvis
+ Colonne1 = spine1
+  Poitrine = spine3
+   Cou = neck
+    Tête = head
+   Clavicule_G = left_collar
+    Bras_G = left_shoulder
+     AvantBras_G = left_elbow
+      Main_G = left_wrist
+       Pouce1_G = left_thumb1
+       Index1_G = left_index1
+   Clavicule_D = right_collar
+    Bras_D = right_shoulder
+     AvantBras_D = right_elbow
+      Main_D = right_wrist
+       Pouce1_D = right_thumb1
+       Index1_D = right_index1
+ Cuisse_G = left_hip
+  Tibia_G = left_knee
+   Pied_G = left_ankle
+    Orteils_G = left_foot
+ Cuisse_D = right_hip
+  Tibia_D = right_knee
+   Pied_D = right_ankle
+    Orteils_D = right_foot
+"""
+FRENCH_JOINTS = """
+hanches = pelvis
+ colonne = spine1
+  torse = spine3
+   cou = neck
+    tete = head
+   clavicule gauche = left_collar
+    epaule gauche = left_shoulder
+     coude gauche = left_elbow
+      poignet gauche = left_wrist
+       pouce1 gauche = left_thumb1
+       index1 gauche = left_index1
+   clavicule droite = right_collar
+    epaule droite = right_shoulder
+     coude droite = right_elbow
+      poignet droite = right_wrist
+       pouce1 droite = right_thumb1
+       index1 droite = right_index1
+ hanche gauche = left_hip
+  genou gauche = left_knee
+   cheville gauche = left_ankle
+    pied gauche = left_foot
+ hanche droite = right_hip
+  genou droite = right_knee
+   cheville droite = right_ankle
+    pied droite = right_foot
+"""
+SPANISH = """
+Cadera = pelvis
+ Columna1 = spine1
+  Pecho = spine3
+   Cuello = neck
+    Cabeza = head
+   Hombro.Izq = left_collar
+    Brazo.Izq = left_shoulder
+     Antebrazo.Izq = left_elbow
+      Mano.Izq = left_wrist
+       Pulgar1.Izq = left_thumb1
+       Indice1.Izq = left_index1
+   Hombro.Der = right_collar
+    Brazo.Der = right_shoulder
+     Antebrazo.Der = right_elbow
+      Mano.Der = right_wrist
+       Pulgar1.Der = right_thumb1
+       Indice1.Der = right_index1
+ Muslo.Izq = left_hip
+  Pierna.Izq = left_knee
+   Pie.Izq = left_ankle
+    Dedos.Izq = left_foot
+ Muslo.Der = right_hip
+  Pierna.Der = right_knee
+   Pie.Der = right_ankle
+    Dedos.Der = right_foot
+"""
+SPANISH_JOINTS = """
+pelvis = pelvis
+ espalda = spine1
+  torso = spine3
+   cuello = neck
+    cabeza = head
+   clavicula_izquierda = left_collar
+    hombro_izquierda = left_shoulder
+     codo_izquierda = left_elbow
+      muneca_izquierda = left_wrist
+       pulgar1_izquierda = left_thumb1
+       índice1_izquierda = left_index1
+   clavicula_derecha = right_collar
+    hombro_derecha = right_shoulder
+     codo_derecha = right_elbow
+      muneca_derecha = right_wrist
+       pulgar1_derecha = right_thumb1
+       índice1_derecha = right_index1
+ cadera_izquierda = left_hip
+  rodilla_izquierda = left_knee
+   tobillo_izquierda = left_ankle
+    pie_izquierda = left_foot
+ cadera_derecha = right_hip
+  rodilla_derecha = right_knee
+   tobillo_derecha = right_ankle
+    pie_derecha = right_foot
+"""
+ITALIAN = """
+Bacino = pelvis
+ Spina1 = spine1
+  Petto = spine3
+   Collo = neck
+    Testa = head
+   Spalla_SX = left_collar
+    Braccio_SX = left_shoulder
+     Avambraccio_SX = left_elbow
+      Mano_SX = left_wrist
+       Pollice1_SX = left_thumb1
+       Indice1_SX = left_index1
+   Spalla_DX = right_collar
+    Braccio_DX = right_shoulder
+     Avambraccio_DX = right_elbow
+      Mano_DX = right_wrist
+       Pollice1_DX = right_thumb1
+       Indice1_DX = right_index1
+ Coscia_SX = left_hip
+  Gamba_SX = left_knee
+   Piede_SX = left_ankle
+    Dita_SX = left_foot
+ Coscia_DX = right_hip
+  Gamba_DX = right_knee
+   Piede_DX = right_ankle
+    Dita_DX = right_foot
+"""
+PORTUGUESE = """
+Quadril = pelvis
+ Coluna1 = spine1
+  Peito = spine3
+   Pescoço = neck
+    Cabeça = head
+   Ombro_E = left_collar
+    Braço_E = left_shoulder
+     Antebraço_E = left_elbow
+      Mão_E = left_wrist
+       Polegar1_E = left_thumb1
+       Indicador1_E = left_index1
+   Ombro_D = right_collar
+    Braço_D = right_shoulder
+     Antebraço_D = right_elbow
+      Mão_D = right_wrist
+       Polegar1_D = right_thumb1
+       Indicador1_D = right_index1
+ Coxa_E = left_hip
+  Perna_E = left_knee
+   Pé_E = left_ankle
+    Dedos_E = left_foot
+ Coxa_D = right_hip
+  Perna_D = right_knee
+   Pé_D = right_ankle
+    Dedos_D = right_foot
+"""
+CHINESE = """
+骨盆 = pelvis
+ 脊柱1 = spine1
+  胸部 = spine3
+   脖子 = neck
+    头 = head
+   左锁骨 = left_collar
+    左上臂 = left_shoulder
+     左前臂 = left_elbow
+      左手 = left_wrist
+       左拇指1 = left_thumb1
+       左食指1 = left_index1
+   右锁骨 = right_collar
+    右上臂 = right_shoulder
+     右前臂 = right_elbow
+      右手 = right_wrist
+       右拇指1 = right_thumb1
+       右食指1 = right_index1
+ 左大腿 = left_hip
+  左小腿 = left_knee
+   左脚 = left_ankle
+    左脚趾 = left_foot
+ 右大腿 = right_hip
+  右小腿 = right_knee
+   右脚 = right_ankle
+    右脚趾 = right_foot
+"""
+CHINESE_LATIN = """
+gupen = pelvis
+ jizhu1 = spine1
+  xiong = spine3
+   bozi = neck
+    tou = head
+   zuo_jian = left_collar
+    zuo_dabi = left_shoulder
+     zuo_xiaobi = left_elbow
+      zuo_shou = left_wrist
+       zuo_muzhi1 = left_thumb1
+       zuo_shizhi1 = left_index1
+   you_jian = right_collar
+    you_dabi = right_shoulder
+     you_xiaobi = right_elbow
+      you_shou = right_wrist
+       you_muzhi1 = right_thumb1
+       you_shizhi1 = right_index1
+ zuo_datui = left_hip
+  zuo_xiaotui = left_knee
+   zuo_jiao = left_ankle
+    zuo_jiaozhi = left_foot
+ you_datui = right_hip
+  you_xiaotui = right_knee
+   you_jiao = right_ankle
+    you_jiaozhi = right_foot
+"""
 PAWS = """
 Hips = pelvis
  Spine = spine1
@@ -1034,6 +1250,21 @@ TABLES = {
     "german in ascii": changed(GERMAN, lambda name: name.replace("ß", "ss").replace("ä", "ae")
                                .replace("links", "L").replace("rechts", "R")),
     "japanese": JAPANESE,
+    "french": FRENCH,
+    "french joints": FRENCH_JOINTS,
+    "french in ascii": changed(FRENCH, lambda name: name.replace("ê", "e")),
+    "spanish": SPANISH,
+    "spanish with initials": changed(SPANISH, lambda name: name.replace("Izq", "I")
+                                     .replace("Der", "D")),
+    "spanish joints": SPANISH_JOINTS,
+    "italian": ITALIAN,
+    "portuguese": PORTUGUESE,
+    "portuguese in ascii": changed(PORTUGUESE, lambda name: name.replace("ç", "c")
+                                   .replace("ã", "a").replace("é", "e")),
+    "chinese": CHINESE,
+    "chinese at the end": changed(CHINESE, lambda name: f"{name[1:]}_{name[0]}"
+                                  if name[0] in "左右" else name),
+    "chinese in latin letters": CHINESE_LATIN,
     "paws": PAWS,
     "mixamo in one word": changed(MIXAMO, lambda name: name.replace(":", "")),
     "mixamo behind a path": changed(MIXAMO, lambda name: f"Armature|{name}"),

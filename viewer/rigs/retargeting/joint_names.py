@@ -68,25 +68,65 @@ _FAMILIES = {
     "German": (
         "schlüsselbein/schluesselbein/schulter oberarm unterarm hand -",
         "oberschenkel unterschenkel fuß/fuss zehen/zehe"),
+    "Chinese": (
+        "锁骨/鎖骨/肩/肩膀 上臂/大臂 前臂/小臂/下臂 手/手掌/手腕 -",
+        "大腿 小腿 脚/腳/足/脚踝/腳踝 脚趾/腳趾/脚尖/腳尖/脚掌"),
+    "Chinese in Latin letters": (
+        "suogu/jian/jianbang dabi/shangbi xiaobi/qianbi shou/shouwan/shouzhang -",
+        "datui xiaotui jiao/jiaohuai/jiaowan jiaozhi/jiaojian/jiaozhang"),
+}  # fmt: skip
+# The Romance languages have one row of bones and one of joints each.
+_ROMANCE = {
+    "French": (
+        "clavicule/épaule/epaule bras avantbras main -", "cuisse jambe/tibia/mollet pied orteils"),
+    "French, joints": (
+        "clavicule épaule/epaule coude poignet main", "hanche genou cheville pied/orteils"),
+    "Spanish": (
+        "clavícula/clavicula/hombro brazo antebrazo mano -",
+        "muslo pierna/pantorrilla pie dedos/punta"),
+    "Spanish, joints": (
+        "clavícula/clavicula hombro codo muñeca/muneca mano", "cadera rodilla tobillo pie/dedos"),
+    "Italian": (
+        "clavicola/spalla braccio avambraccio mano -", "coscia gamba/polpaccio piede dita/punta"),
+    "Italian, joints": (
+        "clavicola spalla gomito polso mano", "anca ginocchio caviglia piede/dita"),
+    "Portuguese": (
+        "clavícula/clavicula/ombro braço/braco antebraço/antebraco mão/mao -",
+        "coxa perna/panturrilha pé/pe dedos/ponta"),
+    "Portuguese, joints": (
+        "clavícula/clavicula ombro cotovelo pulso/punho mão/mao",
+        "quadril joelho tornozelo pé/pe/dedos"),
 }  # fmt: skip
 # Joints that a limb has even if it lacks others: a shoulder is no collar without an upper arm.
 _NEEDED = ("shoulder", "wrist", "hip", "ankle")
 
 # Words with the same meaning in all families.
 _TRUNK = {
-    "pelvis": "pelvis hips hip spinebase lowertorso lowerbody becken hüfte huefte kahanshin 下半身",
+    "pelvis": "pelvis hips hip spinebase lowertorso lowerbody becken hüfte huefte "
+    "bassin hanches cadera caderas bacino bacia pelve quadril gupen pengu tun kahanshin "
+    "下半身 骨盆 盆骨 臀 臀部",
     "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper ab chest chestlower "
     "chestupper upperchest torso uppertorso thorax waist spinemid spineshoulder spinechest "
-    "spinenavel upperbody wirbelsäule wirbelsaeule bauch brust jouhanshin 上半身 背骨 胸",
-    "neck": "neck lowerneck upperneck necklower neckupper necktwist hals kubi 首",
-    "head": "head kopf atama 頭",
-    "jaw": "jaw kiefer あご",
+    "spinenavel upperbody wirbelsäule wirbelsaeule bauch brust colonne torse "
+    "buste poitrine ventre columna espalda pecho tronco spina schiena petto busto addome coluna "
+    "costas peito tórax jizhu jizhui xiong xiongbu jouhanshin 上半身 背骨 胸 脊柱 脊椎 胸部 腹部",
+    "neck": "neck lowerneck upperneck necklower neckupper necktwist hals cou cuello collo "
+    "pescoço pescoco bozi jing jingbu kubi 首 脖子 颈 頸 颈部 頸部",
+    "head": "head kopf tête tete cabeza testa cabeça cabeca tou toubu atama 頭 头 头部 頭部",
+    "jaw": "jaw kiefer mâchoire machoire mandíbula mandibula mandibola xiaba あご 下巴",
 }
 _CENTRE = {word: part for part, words in _TRUNK.items() for word in words.split()}
 _EYES = {"eye", "eyesmplhf", "eyeball", "adjfaceeye", "目"}
 _XSENS_SPINE = {"l5", "l3", "t12", "t8"}
 _CHAINS = ("spine", "neck")
 
+_ROMANCE_FINGERS = {
+    **{"pouce": "thumb", "index": "index", "majeur": "middle", "annulaire": "ring"},
+    **{"auriculaire": "pinky", "pulgar": "thumb", "índice": "index", "indice": "index"},
+    **{"medio": "middle", "anular": "ring", "meñique": "pinky", "menique": "pinky"},
+    **{"pollice": "thumb", "anulare": "ring", "mignolo": "pinky"},
+    **{"polegar": "thumb", "indicador": "index", "anelar": "ring", "mindinho": "pinky"},
+}
 _FINGERS = {
     **{name: name for name in ("thumb", "index", "middle", "ring", "pinky")},
     **{"mid": "middle", "little": "pinky", "fore": "index", "third": "ring"},
@@ -95,10 +135,14 @@ _FINGERS = {
     **{"nakayubi": "middle", "kusuriyubi": "ring", "koyubi": "pinky"},
     **{"親指": "thumb", "人指": "index", "人差指": "index", "人差し指": "index"},
     **{"中指": "middle", "薬指": "ring", "小指": "pinky"},
+    **_ROMANCE_FINGERS,
+    **{"拇指": "thumb", "大拇指": "thumb", "食指": "index", "无名指": "ring", "無名指": "ring"},
+    **{"muzhi": "thumb", "shizhi": "index", "zhongzhi": "middle"},
+    **{"wumingzhi": "ring", "xiaozhi": "pinky"},
 }
 _PHALANX = {"metacarpal": 0, "proximal": 1, "intermediate": 2, "medial": 2, "distal": 3}
 _FINGER = re.compile(
-    rf"(?:hand|finger|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
+    rf"(?:hand|finger|doigt|dedo|dito|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
 )
 _NUMBERED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _ROKOKO_FINGER = re.compile(rf"finger([1-5])({'|'.join(_PHALANX)})")
@@ -107,17 +151,22 @@ _BIPED_FINGER = re.compile(r"finger([0-4])([12]?)")
 _SIDES = {
     **dict.fromkeys(("l", "left", "lft", "lt", "links", "hidari", "左"), "left"),
     **dict.fromkeys(("r", "right", "rgt", "rt", "rechts", "migi", "右"), "right"),
-    # French, Spanish and Italian
+    # French, Spanish, Italian, Portuguese and Chinese
     **dict.fromkeys(("gauche", "izq", "izquierda", "izquierdo"), "left"),
     **dict.fromkeys(("droit", "droite", "der", "derecha", "derecho"), "right"),
     **dict.fromkeys(("sx", "sinistra", "sinistro"), "left"),
     **dict.fromkeys(("dx", "destra", "destro"), "right"),
+    **dict.fromkeys(("esq", "esquerda", "esquerdo", "zuo"), "left"),
+    **dict.fromkeys(("dir", "direita", "direito", "you"), "right"),
 }
+# Initials of these words, only behind or before a word of the same languages.
+_INITIALS = {"g": "left", "i": "left", "s": "left", "e": "left", "d": "right"}
 _PAIRS = (
     *(("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi")),
     *(("links", "rechts"), ("gauche", "droit"), ("gauche", "droite"), ("izq", "der"), ("sx", "dx")),
     *(("izquierda", "derecha"), ("izquierdo", "derecho")),
     *(("sinistra", "destra"), ("sinistro", "destro")),
+    *(("esq", "dir"), ("esquerda", "direita"), ("esquerdo", "direito"), ("zuo", "you")),
 )
 _OTHER_SIDES = dict([*_PAIRS, ("左", "右"), *((b, a) for a, b in _PAIRS), ("右", "左")])
 # Prefixes that are removed before the side or word is identified.
@@ -150,7 +199,14 @@ def _meanings(joints: Sequence[str], row: str) -> dict[str, str]:
     return {word: joint for joint, words in cells for word in words.split("/") if word != "-"}
 
 
-_LIMBS = [(_meanings(_ARM, arm), _meanings(_LEG, leg)) for arm, leg in _FAMILIES.values()]
+_LIMBS = [
+    (_meanings(_ARM, arm), _meanings(_LEG, leg))
+    for arm, leg in (*_FAMILIES.values(), *_ROMANCE.values())
+]
+_ROMANCE_WORDS = {
+    *(word for row in _ROMANCE.values() for cells in row for word in re.split("[ /]", cells)),
+    *_ROMANCE_FINGERS,
+}
 _SIDED = {word for limbs in _LIMBS for limb in limbs for word in limb}
 _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "foot"} - {"foot"}
 
@@ -471,6 +527,10 @@ def _key(tokens: list[str]) -> _Key:
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
             return _SIDES[tokens[end]], _word(rest)
+        if len(tokens) > 1 and tokens[end] in _INITIALS:
+            word = _word(tokens[1:] if end == 0 else tokens[:-1])
+            if word.rstrip("0123456789") in _ROMANCE_WORDS:
+                return _INITIALS[tokens[end]], word
     # Blender adds numbers after the side: f_index.01.L, but also thigh.L.001.
     if len(tokens) > 2 and tokens[-2] in _SIDES and tokens[-1].isdigit():
         return _SIDES[tokens[-2]], _word([*tokens[:-2], tokens[-1]])
