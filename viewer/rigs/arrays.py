@@ -127,14 +127,17 @@ def require_shape(name: str, found: tuple[int, ...], shape: tuple[int | None, ..
 
 
 def freeze_fields(
-    owner: object, dtype: DTypeLike = np.float64, /, **shapes: tuple[int | None, ...]
+    owner: Any, dtype: DTypeLike = np.float64, /, **shapes: tuple[int | None, ...]
 ) -> None:
     """Pass fields of a frozen dataclass through ``frozen``, each with its shape, in this order.
 
-    Of an array that is read on first use, only the shape is checked.
+    Fields that may be None stay None. Of an array that is read on first use, only the shape is
+    checked.
     """
     for name, shape in shapes.items():
         values = getattr(owner, name)
+        if values is None and "None" in owner.__dataclass_fields__[name].type:
+            continue
         if isinstance(values, Deferred):
             require_shape(name, values.shape, shape)
         else:

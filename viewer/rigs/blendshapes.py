@@ -70,17 +70,13 @@ class BlendShapes:
     """Properties of materials that the weights change; None if there are none."""
 
     def __post_init__(self) -> None:
-        for name, size in (("origins", ()), ("ranges", (2,))):
-            if getattr(self, name) is not None:
-                freeze_fields(self, **{name: (len(self.names), *size)})
-        freeze_fields(self, offsets=(len(self.names), None, 3))
-        if self.normal_offsets is not None:
-            freeze_fields(self, normal_offsets=self.offsets.shape)
+        count = len(self.names)
+        freeze_fields(self, origins=(count,), ranges=(count, 2), offsets=(count, None, 3))
+        freeze_fields(self, normal_offsets=self.offsets.shape, rest_weights=(count,))
+        if self.rest_weights is not None and not self.rest_weights.any():
+            object.__setattr__(self, "rest_weights", None)
         if not self.groups:
-            object.__setattr__(self, "groups", ("shape",) * len(self.names))
-        if self.rest_weights is not None:
-            weights = frozen("rest_weights", self.rest_weights, (len(self.names),))
-            object.__setattr__(self, "rest_weights", weights if weights.any() else None)
+            object.__setattr__(self, "groups", ("shape",) * count)
         if len(self.groups) != len(self.names):
             raise RigError(f"groups: expected {len(self.names)}, found {len(self.groups)}")
 
@@ -276,13 +272,9 @@ class JointRegressor:
     """(J, 3) or None. Constants b; None if all are 0."""
 
     def __post_init__(self) -> None:
-        if self.axes is not None:
-            freeze_fields(self, np.int32, axes=(len(self.joints), 2))
-        if self.bias is not None:
-            freeze_fields(self, bias=(self.n_joints, 3))
         count = len(self.joints)
-        freeze_fields(self, np.int32, joints=(count,), vertices=(count,))
-        freeze_fields(self, weights=(count,))
+        freeze_fields(self, np.int32, axes=(count, 2), joints=(count,), vertices=(count,))
+        freeze_fields(self, bias=(self.n_joints, 3), weights=(count,))
         if len(self.joints) and not 0 <= self.joints.min() <= self.joints.max() < self.n_joints:
             raise RigError(f"joints: expected indices 0 to {self.n_joints - 1}")
         if len(self.vertices) and self.vertices.min() < 0:

@@ -11,7 +11,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.phrases import counted, printable
-from viewer.rigs.arrays import Floats, Ints, frozen
+from viewer.rigs.arrays import Floats, Ints, freeze_fields
 from viewer.rigs.bodies.smpl_family import ShapeSpace
 from viewer.rigs.checked_fields import checked
 from viewer.rigs.geometry.vectors import Up
@@ -163,9 +163,7 @@ class Figure:
     def _check_vertices(self) -> None:
         """Check that all per-vertex data fits the mesh."""
         count = 0 if self.mesh is None else self.mesh.n_vertices
-        if self.symmetry is not None:
-            symmetry = frozen("symmetry", self.symmetry, (count,), np.int32)
-            object.__setattr__(self, "symmetry", symmetry)
+        freeze_fields(self, np.int32, symmetry=(count,))
         ends: dict[str, int | None] = {
             "blend shapes": self.blend_shapes.n_vertices if self.blend_shapes else None,
             "correctives": self.correctives.n_vertices if self.correctives else None,

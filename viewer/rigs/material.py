@@ -166,8 +166,7 @@ class Texture:
     """The PNG or JPEG file that ``image`` was decoded from, if it was part of another file."""
 
     def __post_init__(self) -> None:
-        if self.image is not None:
-            freeze_fields(self, np.uint8, image=(None, None, 4))
+        freeze_fields(self, np.uint8, image=(None, None, 4))
         if self.transform is None:
             object.__setattr__(self, "transform", np.eye(2, 3))
         freeze_fields(self, transform=(2, 3))

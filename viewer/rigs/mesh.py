@@ -68,14 +68,11 @@ class Mesh:
         freeze_fields(self, positions=(None, 3))
         freeze_fields(self, normals=(self.n_vertices, 3))
         freeze_fields(self, np.int32, triangles=(None, 3))
-        if self.uvs is not None:
-            freeze_fields(self, uvs=(self.n_vertices if self.uv_triangles is None else None, 2))
+        freeze_fields(self, uvs=(self.n_vertices if self.uv_triangles is None else None, 2))
         rows = 0 if self.uvs is None else len(self.uvs)
         put("other_uvs", tuple(frozen("other_uvs", uvs, (rows, 2)) for uvs in self.other_uvs))
-        if self.uv_triangles is not None:
-            freeze_fields(self, np.int32, uv_triangles=(self.n_triangles, 3))
-        if self.colors is not None:
-            freeze_fields(self, colors=(self.n_vertices, 4))
+        freeze_fields(self, np.int32, uv_triangles=(self.n_triangles, 3))
+        freeze_fields(self, colors=(self.n_vertices, 4))
         for name in ("triangle_materials", "triangle_parts"):
             given = getattr(self, name)
             if name == "triangle_parts" and not self.parts and np.all(np.asarray(given) == -1):

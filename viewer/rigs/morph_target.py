@@ -37,9 +37,7 @@ class MorphTarget:
     def __post_init__(self) -> None:
         freeze_fields(self, np.int32, vertices=(None,))
         count = len(self.vertices)
-        freeze_fields(self, positions=(count, 3))
-        if self.normals is not None:
-            freeze_fields(self, normals=(count, 3))
+        freeze_fields(self, positions=(count, 3), normals=(count, 3))
         if len(np.unique(self.vertices)) < count:
             raise RigError(f"morph {self.name}: a vertex is listed twice")
 

@@ -77,11 +77,8 @@ class Skeleton:
         freeze_fields(self, rest_scales=(joints, 3))
         freeze_fields(self, np.int32, dof_joints=(None,))
         freeze_fields(self, np.int32, dof_kinds=(self.n_dofs,))
-        freeze_fields(self, rest_dofs=(self.n_dofs,))
-        if self.boxes is not None:
-            freeze_fields(self, boxes=(joints, 2, 3))
-        if self.auxiliary is not None:
-            freeze_fields(self, np.bool_, auxiliary=(joints,))
+        freeze_fields(self, rest_dofs=(self.n_dofs,), boxes=(joints, 2, 3))
+        freeze_fields(self, np.bool_, auxiliary=(joints,))
         try:
             limits = np.array(self.dof_limits, dtype=np.float64)
         except (TypeError, ValueError):

@@ -46,10 +46,8 @@ class Skin:
     def __post_init__(self) -> None:
         freeze_fields(self, np.int32, starts=(None,), joints=(None,))
         freeze_fields(self, weights=(len(self.joints),), inverse_bind=(None, 4, 4))
-        if self.dqs_fractions is not None:
-            freeze_fields(self, dqs_fractions=(len(self.starts) - 1,))
-        if self.unweighted is not None:
-            freeze_fields(self, np.bool_, unweighted=(len(self.starts) - 1,))
+        freeze_fields(self, dqs_fractions=(len(self.starts) - 1,))
+        freeze_fields(self, np.bool_, unweighted=(len(self.starts) - 1,))
         counts = np.diff(self.starts)
         if len(self.starts) == 0 or self.starts[0] != 0 or (counts < 0).any():
             raise RigError("starts: expected indices that begin at 0 and never decrease")

@@ -117,9 +117,7 @@ class AlignmentSettings:
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
             raise RigError(f'scale: expected {", ".join(SCALES)}, found "{self.scale}"')
-        for name, shape in (("landmarks", (None, 2, 3)), ("matrix", (4, 4))):
-            if getattr(self, name) is not None:
-                freeze_fields(self, **{name: shape})
+        freeze_fields(self, landmarks=(None, 2, 3), matrix=(4, 4))
         if self.landmarks is not None and len(self.landmarks) == 0:
             raise RigError("landmarks: expected 1 or more pairs, found 0")
 

@@ -43,8 +43,7 @@ class CameraMotion:
     def __post_init__(self) -> None:
         count = len(self.rotations)
         freeze_fields(self, rotations=(count, 3, 3), translations=(count, 3))
-        if self.intrinsics is not None:
-            freeze_fields(self, intrinsics=(count, 3, 3))
+        freeze_fields(self, intrinsics=(count, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -66,15 +66,10 @@ class BodyMotion:
     ``about_origin`` to be False and no ``world_rotations``."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...]) -> None:
-            if getattr(self, name) is not None:
-                freeze_fields(self, **{name: shape})
-
-        put("vectors", (None, len(self.joint_names), 3))
-        put("translations", (len(self.vectors), 3))
-        put("shape", (None, None))
-        put("expression", (None, None))
-        put("world_rotations", (len(self.vectors), 3))
+        freeze_fields(self, vectors=(None, len(self.joint_names), 3))
+        count = len(self.vectors)
+        freeze_fields(self, translations=(count, 3), shape=(None, None), expression=(None, None))
+        freeze_fields(self, world_rotations=(count, 3))
 
     @property
     def n_rows(self) -> int:

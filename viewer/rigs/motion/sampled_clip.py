@@ -50,16 +50,11 @@ class SampledClip:
     all frames. If None, the pose's values are used."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...]) -> None:
-            if getattr(self, name) is not None:
-                freeze_fields(self, **{name: shape})
-
-        put("rotations", (None, None, 4))
-        put("translations", (*self.rotations.shape[:2], 3))
-        put("figure_translations", (self.n_rows, 3))
-        put("figure_scales", (self.n_rows,))
-        put("shape_weights", (None, None))
-        put("scales", (None, self.n_joints, 3))
+        freeze_fields(self, rotations=(None, None, 4))
+        count = self.n_rows
+        freeze_fields(self, translations=(count, self.n_joints, 3), figure_translations=(count, 3))
+        freeze_fields(self, figure_scales=(count,), shape_weights=(None, None))
+        freeze_fields(self, scales=(None, self.n_joints, 3))
         for name in ("shape_weights", "scales"):
             rows = getattr(self, name)
             if rows is not None and len(rows) not in (1, self.n_rows):

@@ -77,12 +77,10 @@ class TransformChannel:
             raise RigError("times: expected increasing seconds of at least one key")
         if (self.tangents is not None) != (self.interpolation == "cubic"):
             raise RigError("tangents: expected for cubic interpolation, and only there")
-        if self.tangents is not None:
-            freeze_fields(self, tangents=(count, 2, self.n_components))
+        freeze_fields(self, tangents=(count, 2, self.n_components))
         if (self.shapes is not None) != (self.path == "weights"):
             raise RigError("shapes: expected for weights, and only there")
-        if self.shapes is not None:
-            freeze_fields(self, np.int32, shapes=(self.n_components,))
+        freeze_fields(self, np.int32, shapes=(self.n_components,))
         if self.path == "rotation" and not self.values.any(axis=1).all():
             key = int(np.argmin(self.values.any(axis=1)))
             raise RigError(f"values of key {key}: expected a quaternion, found 0 0 0 0")
