@@ -18,7 +18,6 @@ from viewer.phrases import printable
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.sampled_animation import clip_of, sample_animation
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
-from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.scene import Actor, Scene, pose_actors
 
@@ -142,13 +141,7 @@ def _between(source: Actor, target: Actor, settings: MotionSettings) -> Scene:
     sampled, figure = sample_animation(source), source.figure
     clip = clip_of(source.title, sampled, start=float(sampled.frames.times[0]))
     bare = Figure(source.title, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
-    drive = Drive(
-        SkeletonMotion(bare, replace(clip, shape_weights=None)),
-        settings.source_rest,
-        settings.joint_map,
-        plants_feet=settings.feet,
-        keeps_hands=settings.hand_contact,
-    )
+    drive = settings.drive_of(SkeletonMotion(bare, replace(clip, shape_weights=None)))
     moved, notes = driven_clip(drive, target.figure)
     actor = replace(
         target.copy(), clip=moved, drive=drive, called=source.title, offset=0.0, is_present=True

@@ -12,6 +12,8 @@ from viewer.rigs.units import METRES
 
 if TYPE_CHECKING:
     from viewer.rigs.cleanup.smoothing import OneEuro, SavitzkyGolay
+    from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+    from viewer.rigs.retargeting.drive import Drive
     from viewer.rigs.retargeting.joint_map import JointMap
 
 
@@ -124,6 +126,19 @@ class MotionSettings:
     )
     joint_map: JointMap | None = None
     """Joints of driven figures and the joints that drive them; None to match them by name."""
+
+    def drive_of(self, motion: SkeletonMotion, hangs: bool = False) -> Drive:
+        """Return a motion that drives figures; ``hangs``: its up axis points down."""
+        from viewer.rigs.retargeting.drive import Drive
+
+        return Drive(
+            motion,
+            self.source_rest,
+            self.joint_map,
+            plants_feet=self.feet,
+            keeps_hands=self.hand_contact,
+            hangs=hangs,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,14 +70,7 @@ def give_skeleton_motion(
         )
     _check_rest(path, motion, settings)
     placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
-    drive = Drive(
-        motion,
-        settings.source_rest,
-        settings.joint_map,
-        plants_feet=settings.feet,
-        keeps_hands=settings.hand_contact,
-        hangs=settings.up.startswith("-"),
-    )
+    drive = settings.drive_of(motion, hangs=settings.up.startswith("-"))
     if settings.drives and model is not None:
         try:
             clip, notes = driven_clip(drive, model)
@@ -274,13 +267,7 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
             continue  # reported when the animations are started
         path = actor.file or Path(figure.name)
         _check_rest(path, motion, settings)
-        drive = Drive(
-            motion,
-            settings.source_rest,
-            settings.joint_map,
-            plants_feet=settings.feet,
-            keeps_hands=settings.hand_contact,
-        )
+        drive = settings.drive_of(motion)
         if drive_somebody(path, drive, draft, np.eye(4), others)[0]:
             draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))
             found = True
