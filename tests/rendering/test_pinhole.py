@@ -10,7 +10,7 @@ from viewer.errors import RigError
 from viewer.rendering.camera import Camera, camera_axes, camera_from_view, eye, orbit
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.pinhole import distortion_error, picture_size
+from viewer.rendering.pinhole import distortion_error
 from viewer.rigs.captures.cameras import CameraView
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
@@ -91,14 +91,14 @@ def test_images_of_another_aspect_ratio_are_letterboxed():
 
 def test_principal_point_is_in_the_middle_without_a_size():
     # Pixels are counted from the centre of the first pixel: the centre of 601 pixels is 300.
-    assert picture_size(camera_view(size=None)) == (601.0, 521.0)
-    assert picture_size(camera_view(size=None, intrinsic=2.0 * K)) == (601.0, 521.0)
+    assert camera_view(size=None).picture_size == (601.0, 521.0)
+    assert camera_view(size=None, intrinsic=2.0 * K).picture_size == (601.0, 521.0)
     assert pixel(camera_view(size=None), (0, 0, 0), (601, 521)) == pytest.approx([300.0, 260.0])
     # On the axis of the camera, and so in the middle of pictures of any size.
     centre = pixel(camera_view(size=None), (0, 0, 0), (1202, 1042))
     assert centre == pytest.approx([600.5, 520.5])
     with pytest.raises(RigError) as caught:
-        picture_size(camera_view(size=None, intrinsic=np.diag([800.0, 800.0, 1.0])))
+        _ = camera_view(size=None, intrinsic=np.diag([800.0, 800.0, 1.0])).picture_size
     assert str(caught.value) == (
         "camera 01: expected a principal point above 0 or the size of the pictures, found 0, 0"
     )

@@ -238,10 +238,8 @@ def camera_from_view(
     ``box``: (2, 3), bounds of the objects to orbit, scene space; the origin if omitted. ``seen``:
     the camera at the time and in the pose of the scene, from ``view_in``, if it moves.
     """
-    from viewer.rendering.pinhole import picture_size
-
     fixed, view = view, seen or view
-    width, height = picture_size(view)
+    width, height = view.picture_size
     aspect = size[0] / size[1]
     # Number of rows of the image, including the margins above and below.
     rows = max(height, width / aspect)

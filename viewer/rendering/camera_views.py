@@ -19,7 +19,6 @@ from viewer.rendering.pinhole import (
     frusta_points,
     frustum_corners,
     frustum_depth,
-    picture_size,
 )
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.view import View
@@ -161,7 +160,7 @@ def _image(scene: Scene, camera: CameraView) -> CameraImage | None:
 
 def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
     """Return whether images of a size have the aspect ratio of a camera's calibration."""
-    width, height = picture_size(camera)
+    width, height = camera.picture_size
     return abs(size[0] * height / (size[1] * width) - 1.0) <= _TOLERANCE
 
 
@@ -175,7 +174,7 @@ def image_notes(scene: Scene, camera: CameraView) -> list[str]:
     if size is None:
         return [f"camera {name}: its first image is not readable"]
     notes = scene.images.notes_of(camera.name)
-    width, height = map(round, picture_size(camera))
+    width, height = map(round, camera.picture_size)
     if size != (width, height):
         sizes = f"its images have {size[0]} x {size[1]} pixels, the calibration {width} x {height}"
         how = "they are scaled" if fits(camera, size) else "they do not match and are not drawn"

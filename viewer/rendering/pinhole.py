@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import RigError
 from viewer.rigs.arrays import Floats
 from viewer.rigs.mesh import box_size
 
@@ -19,22 +18,6 @@ _UNBOUNDED = 1e9  # value that replaces an infinite distortion
 _THINNEST = 1e-6  # minimum depth in front of and behind the scene, relative to its distance
 _DEPTH = 0.2  # distance of the image planes of frusta, relative to the size of the scene
 _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's centre
-
-
-def picture_size(view: CameraView) -> tuple[float, float]:
-    """Return the width and height of a camera's images, pixels."""
-    # If the files do not state the size, the principal point is assumed to be the image centre: (W
-    # - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first pixel.
-    if view.size is not None:
-        return float(view.size[0]), float(view.size[1])
-    across, down = view.intrinsic[:2, 2] / view.intrinsic[2, 2]
-    width, height = 2.0 * across + 1.0, 2.0 * down + 1.0
-    if not (across > 0.0 and down > 0.0):
-        raise RigError(
-            f"camera {view.name}: expected a principal point above 0 or the size of the pictures, "
-            f"found {across:g}, {down:g}"
-        )
-    return float(width), float(height)
 
 
 def pinhole_view(view: CameraView) -> Floats:
@@ -53,7 +36,7 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
     different aspect ratio shows all of the camera's image in its centre, with margins on two sides.
     ``box``: (2, 3), bounds that must lie between the near and the far plane, scene space.
     """
-    width, height = picture_size(view)
+    width, height = view.picture_size
     k = view.intrinsic / view.intrinsic[2, 2]
     distance = float(np.linalg.norm(view.rotation @ box.mean(axis=0) + view.translation))
     reach = box_size(box) or distance or 1.0
@@ -87,7 +70,7 @@ def distortion_error(view: CameraView) -> float:
     are ignored.
     """
     k1, k2, p1, p2, k3, k4, k5, k6 = np.append(view.distortion, np.zeros(8))[:8]
-    width, height = picture_size(view)
+    width, height = view.picture_size
     k = view.intrinsic / view.intrinsic[2, 2]
     corners = [[u, v, 1.0] for u in (0.0, width - 1.0) for v in (0.0, height - 1.0)]
     x, y, _ = np.linalg.solve(k, np.transpose(corners))
@@ -111,7 +94,7 @@ def frustum_corners(camera: CameraView, depth: float) -> Floats:
     """Return the corners of a camera's image at a depth: (4, 3), scene space."""
     # They are clockwise from the upper left, at the corners of the outermost pixels: X = R^T (d
     # K^-1 u - T), without lens distortion.
-    width, height = picture_size(camera)
+    width, height = camera.picture_size
     k = camera.intrinsic / camera.intrinsic[2, 2]
     left, top, right, bottom = -0.5, -0.5, width - 0.5, height - 0.5
     pixels = [[left, top, 1.0], [right, top, 1.0], [right, bottom, 1.0], [left, bottom, 1.0]]

@@ -388,7 +388,7 @@ def _add_cameras(
     for view in views:
         camera = named(view.name)
         focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
-        width, height = _size(view)
+        width, height = view.picture_size
         angle = 2.0 * math.atan(0.5 * height / focal_y)
         aspect = (width / focal_x) / (height / focal_y)
         lens = {"yfov": angle, "aspectRatio": aspect, **_planes(view, to_file)}
@@ -494,16 +494,9 @@ def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
     return {"znear": near} | ({} if view.far is None else {"zfar": scale * view.far})
 
 
-def _size(view: CameraView) -> tuple[float, float]:
-    """Return the width and height of the images; centred about the principal point if unknown."""
-    if view.size is not None:
-        return float(view.size[0]), float(view.size[1])
-    return 2.0 * float(view.intrinsic[0, 2]) + 1.0, 2.0 * float(view.intrinsic[1, 2]) + 1.0
-
-
 def _is_bent(view: CameraView) -> bool:
     """Return whether a lens is distorted, skewed or off centre."""
-    width, height = _size(view)
+    width, height = view.picture_size
     apart = view.intrinsic[:2, 2] - (0.5 * (width - 1.0), 0.5 * (height - 1.0))
     is_off = bool((np.abs(apart) > _CENTRED).any()) or view.intrinsic[0, 1] != 0.0
     return is_off or bool(view.distortion.any())

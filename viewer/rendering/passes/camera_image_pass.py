@@ -8,7 +8,7 @@ import numpy as np
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform, build_mipmaps, checked
-from viewer.rendering.pinhole import frustum_corners, picture_size
+from viewer.rendering.pinhole import frustum_corners
 from viewer.rendering.view import View
 from viewer.rigs.arrays import Floats
 from viewer.rigs.captures.cameras import CameraImage, CameraView
@@ -29,7 +29,7 @@ class CameraImagePass:
         self, camera: CameraView, image: CameraImage, size: tuple[int, int], brightness: float
     ) -> None:
         """Draw the image of the camera through which the scene is seen, behind everything."""
-        width, height = picture_size(camera)
+        width, height = camera.picture_size
         own, aspect = width / height, size[0] / size[1]
         # As in pinhole_projection, the whole image is in the middle.
         across, down = min(own / aspect, 1.0), min(aspect / own, 1.0)
@@ -52,7 +52,7 @@ class CameraImagePass:
         rectangle: tuple[Floats, Floats, Floats],
         brightness: float,
     ) -> None:
-        width, height = picture_size(camera)
+        width, height = camera.picture_size
         intrinsic = camera.intrinsic / camera.intrinsic[2, 2]
         names = "u_corner", "u_right", "u_down"
         values: dict[str, object] = {

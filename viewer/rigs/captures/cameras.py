@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.errors import RigError
 from viewer.rigs.arrays import Bytes, Floats, freeze_fields
 from viewer.rigs.geometry.quaternion import slerp
 from viewer.rigs.geometry.rotation import (
@@ -105,6 +106,23 @@ class CameraView:
     def __post_init__(self) -> None:
         freeze_fields(self, intrinsic=(3, 3), rotation=(3, 3), translation=(3,))
         freeze_fields(self, distortion=(None,))
+
+    @property
+    def picture_size(self) -> tuple[float, float]:
+        """Width and height of its images, pixels."""
+        # If the files do not state the size, the principal point is assumed to be the image centre:
+        # (W - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first
+        # pixel.
+        if self.size is not None:
+            return float(self.size[0]), float(self.size[1])
+        across, down = self.intrinsic[:2, 2] / self.intrinsic[2, 2]
+        width, height = 2.0 * across + 1.0, 2.0 * down + 1.0
+        if not (across > 0.0 and down > 0.0):
+            raise RigError(
+                f"camera {self.name}: expected a principal point above 0 or the size of the "
+                f"pictures, found {across:g}, {down:g}"
+            )
+        return float(width), float(height)
 
 
 def view_at(view: CameraView, seconds: float) -> CameraView:
