@@ -73,7 +73,7 @@ LEAVES = {
     "diagnostics": {"data_classes", "phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
-    "plugins": {"data_classes", "errors", "phrases"},
+    "plugins": {"data_classes", "errors", "interrupts", "phrases", "progress"},
     "progress": {"interrupts"},
     "schemas": set(),
     "version": set(),

@@ -20,6 +20,7 @@ from viewer.errors import PluginError
 from viewer.exporters import EXPORTERS, usable_exporters
 from viewer.formats import FORMATS, all_suffixes
 from viewer.plugins import _installed, plugins_of, without_plugins
+from viewer.progress import Cancelled
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
@@ -168,8 +169,12 @@ def plugin_lines(install):
         ("def read(source): return 1 / 0", "cannot read a.xyz: ZeroDivisionError: division by"),
         ("def read(source): return 3", "expected a Figure from read, found int"),
         ("x = 1", "expected a module with read, found none"),
+        (
+            "class Panic(BaseException): ...\nraise Panic('index')",
+            "cannot be imported: Panic: index",
+        ),
     ],
-    ids=["import", "exception", "result", "function"],
+    ids=["import", "exception", "result", "function", "panic"],
 )
 def test_error_of_a_plugin_is_one_line_with_its_package(text, message, install, tmp_path,
                                                         monkeypatch, capsys):  # fmt: skip
@@ -468,6 +473,15 @@ def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install):
         hand.step(2)
     finally:
         hand.close()
+
+
+@pytest.mark.parametrize("end", [Cancelled(), KeyboardInterrupt(), viewer.ViewerError("own words")])
+def test_ends_of_the_work_are_no_errors_of_a_plugin(end, install):
+    install("good", [("formats", "xyz", "json")])
+    (plugin,) = plugins_of("formats")
+    with pytest.raises(type(end)) as caught, plugin.guarded("failed"):
+        raise end
+    assert caught.value is end
 
 
 def test_commands_may_exit(install):

@@ -24,7 +24,9 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from viewer.data_classes import dataclass
 from viewer.errors import PluginError, ViewerError
+from viewer.interrupts import Interrupted
 from viewer.phrases import printable
+from viewer.progress import Cancelled
 
 Group: TypeAlias = Literal[
     "formats", "exporters", "scalars", "checks", "skinning", "commands", "panels", "tools"
@@ -43,6 +45,16 @@ _PARTS: dict[Group, tuple[str, ...]] = {
     "tools": ("recognises", "read"),
 }
 """What the module of an entry point must have."""
+
+_NOT_ITS_OWN = (
+    ViewerError,
+    BrokenPipeError,
+    Cancelled,
+    Interrupted,
+    KeyboardInterrupt,
+    GeneratorExit,
+)
+"""Errors with a text for users, and ends of the work: no mistakes of a plug-in."""
 
 _is_enabled = True
 
@@ -90,9 +102,9 @@ class Plugin:
         """Turn exceptions of the plug-in into errors of one line; ``what`` failed."""
         try:
             yield
-        except (ViewerError, BrokenPipeError):
+        except _NOT_ITS_OWN:
             raise
-        except (Exception, SystemExit) as problem:
+        except BaseException as problem:  # those of extension modules in Rust are no Exception
             if may_exit and isinstance(problem, SystemExit):
                 raise
             reason = printable(f"{type(problem).__name__}: {problem}", 300)
