@@ -5,8 +5,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from formats.gltf.files import File
-from linting.planted import column, moved, weighted, with_normal
+from formats.gltf.files import File, skinned
+from linting.planted import column, inside_out, moved, weighted, with_normal
 from linting.test_bad_keys import FRAMES, RATE, K, about_z, arm, waving
 from linting.test_bad_rigs import (
     NOSE,
@@ -226,6 +226,54 @@ def test_keys_of_scales_are_deleted():
     fix_scene(scene)
     assert [one.path for one in scene.actors[0].clip.channels] == ["rotation"]
     np.testing.assert_array_equal(scene.actors[0].pose.scales[2], 1.0)
+
+
+def test_captured_bones_keep_the_length_at_rest():
+    """The forearm, 0.3 long, is 1.5 times as long in six frames; only it is set back."""
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    turns[:, 3] = about_z(waving())
+    offsets = np.zeros((FRAMES, 6, 3))
+    offsets[:, 0] = np.linspace([0.0, 0.0, 0.0], [0.2, 0.0, 0.0], FRAMES)
+    moved_offsets = offsets.copy()
+    moved_offsets[30:36, 4, 0] = 0.15
+    scene = Scene([Actor(arm(), clip=SampledClip("x", Timing(RATE, K), turns, moved_offsets))])
+    (note,) = fix_scene(scene).notes
+    assert "C022 fixed: translations of left_wrist set to those at rest" in str(note)
+    np.testing.assert_array_equal(scene.actors[0].clip.translations, offsets)
+
+
+def test_weights_that_a_fix_does_not_touch_stay_as_they_are():
+    """Sums that a file rounded to 0.9995 are no fault, and vertex 5 is not beside vertex 11."""
+    figure, note = fixed(weighted({5: [(0, 0.9995)], 11: []}), weights)
+    assert "weights of 1 vertex" in note
+    assert figure.skin.weights[figure.skin.starts[5]] == 0.9995
+
+
+@pytest.mark.parametrize(
+    ("figure", "code", "said"),
+    [
+        (weighted({4: [(0, 0.5), (0, 0.5)]}), "W009", "duplicate influences of 1 vertex merged"),
+        (inside_out(), "M003", "winding of 36 triangles reversed"),
+        (with_normal(3, (0.8, -0.9, -0.8)), "M008", "1 normal normalised"),
+    ],
+)
+def test_convert_fixes_what_it_names(tmp_path, capsys, figure, code, said):
+    export(Actor(figure), tmp_path / "bad.skel")
+    bad, good = ([str(tmp_path / f"{n}.{s}") for s in ("skel", "skin")] for n in ("bad", "good"))
+    before = {one.code for one in lint_files(bad)[1]}
+    assert run(["convert", *bad, "-o", good[0], "--fix", code]) == 0
+    assert f"{code} fixed: {said}" in capsys.readouterr().out
+    assert code in before and {one.code for one in lint_files(good)[1]} <= before - {code}
+
+
+def test_what_was_fixed_on_reading_is_said(tmp_path, capsys):
+    file = skinned()
+    file.primitive["attributes"]["WEIGHTS_0"] = file.accessor([[0.4, 0.4, 0, 0]] * 3)
+    (tmp_path / "bad.gltf").write_bytes(file.json())
+    command = ["convert", str(tmp_path / "bad.gltf"), "-o", str(tmp_path / "good.glb"), "--fix"]
+    assert run(command) == 0
+    (line,) = (one for one in capsys.readouterr().out.splitlines() if "W001" in one)
+    assert line.startswith("W001 fixed on reading: ") and "weights of 3 vertices" in line
 
 
 def test_convert_fixes_and_prints_changes(tmp_path, capsys):

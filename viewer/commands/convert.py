@@ -185,7 +185,14 @@ def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
         )
     with shown_progress("fixing"):
         found = fix_scene(scene, codes)
-    if not found.notes and not found.left:
+    # Readers correct some faults themselves: no check can see these.
+    seen = found.codes | {one.code for one in found.left}
+    read = [
+        note("X007.read: {code} fixed on reading: {problem}", code=one.code, problem=one)
+        for one in scene.diagnostics
+        if one.code in (codes or FIXES) and one.code not in seen
+    ]
+    if not found.notes and not found.left and not read:
         return [note("X007.none: nothing to fix")]
     left = [
         Diagnostic(
@@ -194,7 +201,7 @@ def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
         )
         for one in found.left
     ]
-    return [*found.notes, *left]
+    return [*found.notes, *read, *left]
 
 
 def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:

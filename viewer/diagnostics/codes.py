@@ -84,7 +84,7 @@ CODES: dict[str, Code] = {
     "W012": Code(
         "warning",
         "part moved by a distant joint",
-        "bind it to the joint that moves its neighbours",
+        "bind it to the joints around it",
     ),
     "W013": Code("warning", "joints with exchanged weights", "exchange their weights"),
     "W014": Code("warning", "torn seams", "copy the weights of one side of the seam to the other"),

@@ -193,7 +193,10 @@ def _inside_out(
     signs: Floats,
     edges: Edges,
 ) -> Iterator[Finding]:
-    """Report closed components with negative volume, sum a . (b x c) / 6."""
+    """Report closed components with negative volume, sum a . (b x c) / 6.
+
+    With them, open ones are reported whose normals oppose their winding.
+    """
     corners = mesh.positions[mesh.triangles[valid]]
     volumes, areas, members = part_volumes(corners, component, len(valid), signs)
     # Missing triangles do not close a surface, because it may have had a border there.
@@ -205,10 +208,14 @@ def _inside_out(
     wrong = np.flatnonzero((volumes < -HOLLOW * areas**1.5) & is_closed & (members >= 4))
     if len(wrong) == 0:
         return
+    facing = signs[:, None] * area_vectors(mesh.positions, mesh.triangles[valid])
+    agreement = np.einsum("ta,tka->t", facing, mesh.normals[mesh.triangles[valid]])
+    opposed = np.bincount(component, agreement, minlength=len(valid)) < 0.0
+    n_closed, wrong = len(wrong), np.union1d(wrong, np.flatnonzero(opposed & ~is_closed))
     triangles = valid[np.isin(component, wrong)]
     yield subject.found(
         "M003.parts: {n} with {n_triangles} {are} inside out (first: triangle {triangle})",
-        n=counted(len(wrong), "closed part"),
+        n=counted(len(wrong), "closed part" if len(wrong) == n_closed else "part"),
         n_triangles=counted(len(triangles), "triangle"),
         triangle=int(triangles[0]),
         triangles=triangles,

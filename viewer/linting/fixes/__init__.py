@@ -61,6 +61,8 @@ class Fixed:
     """What was changed, and by how much."""
     left: list[Finding]
     """Findings with the requested codes that remain."""
+    codes: set[str]
+    """Codes of the findings that changed something."""
 
 
 def fix_scene(
@@ -68,6 +70,7 @@ def fix_scene(
 ) -> Fixed:
     """Fix what lint finds in a scene, in place: warnings and errors, or all with these codes."""
     chosen, notes, tried = options or LintOptions(), list[Diagnostic](), set[tuple[int, str]]()
+    fixed = set[str]()
     for number in range(_ROUNDS + 1):
         report(number, _ROUNDS + 1, what="fixing")
         left = [one for one in lint_scene(scene, chosen) if _is_wanted(one, codes)]
@@ -85,10 +88,11 @@ def fix_scene(
                 tried.add(_key(finding))
             else:
                 notes.append(said)
+                fixed.add(finding.code)
                 _share(scene, figure, subject.actor.figure)
         if scene.time is not None:
             pose_actors(scene.actors, scene.time)
-    return Fixed(_merged(notes), left)
+    return Fixed(_merged(notes), left, fixed)
 
 
 def _share(scene: Scene, old: Figure, new: Figure) -> None:

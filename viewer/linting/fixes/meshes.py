@@ -21,13 +21,19 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
     mesh = figure.require_mesh()
     vertices, code = finding.vertices, finding.code
     if code in ("M002", "M003"):
-        triangles = mesh.triangles.copy()
+        triangles, normals = mesh.triangles.copy(), mesh.normals.copy()
         triangles[finding.triangles] = triangles[finding.triangles, ::-1]
+        # Normals that agreed with the winding would oppose it.
+        others = np.delete(triangles, finding.triangles, axis=0)
+        wrong = np.setdiff1d(triangles[finding.triangles], others)
+        facing = vertex_normals(mesh.positions, mesh.triangles)[wrong]
+        wrong = wrong[np.einsum("va,va->v", facing, normals[wrong]) > 0.0]
+        normals[wrong] *= -1.0
         corners = mesh.uv_triangles
         if corners is not None:
             corners = corners.copy()
             corners[finding.triangles] = corners[finding.triangles, ::-1]
-        mesh = replace(mesh, triangles=triangles, uv_triangles=corners)
+        mesh = replace(mesh, triangles=triangles, uv_triangles=corners, normals=normals)
         subject.actor.figure = replace(figure, mesh=mesh)
         return note(
             "X007.winding: {figure}: {code} fixed: winding of {n} reversed",
@@ -46,10 +52,11 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
         return None  # vertices without triangles have no normal
     subject.actor.figure = replace(figure, mesh=replace(mesh, normals=normals))
     return note(
-        "X007.normals: {figure}: {code} fixed: {n} computed again",
+        "X007.normals: {figure}: {code} fixed: {n} {done}",
         figure=subject.actor.name,
         code=code,
         n=counted(len(vertices), "normal"),
+        done="computed again" if code == "M007" else "normalised",
     )
 
 

@@ -38,17 +38,8 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
     times = finding.times - actor.offset
     if finding.code == "C020":
         fixed, said = _without_pops(subject, finding, clip, times)
-    elif isinstance(clip, TransformClip):
-        path = "scale" if finding.code == "C023" else "translation"
-        channels = [
-            one
-            for one in clip.channels
-            if one.path != path or one.joint not in set(finding.joints.tolist())
-        ]
-        fixed = replace(clip, channels=tuple(channels))
-        said = f"{path} keys of {{joints}} deleted"
     else:
-        return None
+        fixed, said = _at_rest(subject, finding, clip)
     if fixed is None or (isinstance(fixed, TransformClip) and not fixed.channels):
         return None
     _play(subject, index, clip, fixed)
@@ -59,6 +50,28 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
         joints=listed([labels[joint] for joint in finding.joints]),
         n=counted(len(finding.frames), "frame"),
     )
+
+
+def _at_rest(subject: Subject, finding: Finding, clip: _Motion) -> tuple[_Motion | None, str]:
+    """Return a motion whose joints keep the translations or scales that they have at rest."""
+    path = "scale" if finding.code == "C023" else "translation"
+    joints = finding.joints
+    if isinstance(clip, TransformClip):
+        channels = [one for one in clip.channels if one.path != path or one.joint not in joints]
+        fixed = replace(clip, channels=tuple(channels))
+        return fixed, f"{path} keys of {{joints}} deleted"
+    if not isinstance(clip, SampledClip):
+        return None, ""
+    said = f"{path}s of {{joints}} set to those at rest"
+    if path == "scale" and clip.scales is not None:
+        scales = clip.scales.copy()
+        scales[:, joints] = subject.actor.figure.require_skeleton().rest_scales[joints]
+        return replace(clip, scales=scales), said
+    if path == "translation" and clip.translations is not None:
+        offsets = clip.translations.copy()
+        offsets[:, joints] = 0.0
+        return replace(clip, translations=offsets), said
+    return None, ""
 
 
 _Motion = Clip | TransformClip | SampledClip

@@ -45,16 +45,26 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
     new = _repaired(subject, old, finding)
     if new is None:
         return None
+    if finding.code == "W009":
+        subject.actor.figure = replace(figure, skin=new)
+        return note(
+            "X007.duplicates: {figure}: W009 fixed: duplicate influences of {n} merged",
+            figure=subject.actor.name,
+            n=counted(len(finding.vertices), "vertex"),
+        )
+    # Sums that the file rounded are no change of the others' weights.
+    before, new = (old, new) if finding.code == "W001" else (normalized(old), normalized(new))
     changes = row_norms(
         old.n_vertices,
-        np.concatenate([owners(old), owners(new)]),
-        np.concatenate([old.joints, new.joints]),
-        np.concatenate([old.weights, -new.weights]),
+        np.concatenate([owners(before), owners(new)]),
+        np.concatenate([before.joints, new.joints]),
+        np.concatenate([before.weights, -new.weights]),
     )
-    changed = np.flatnonzero(changes > _CHANGED)
+    is_changed = changes > _CHANGED
+    changed = np.flatnonzero(is_changed)
     if len(changed) == 0:
         return None
-    subject.actor.figure = replace(figure, skin=new)
+    subject.actor.figure = replace(figure, skin=_spliced(old, new, is_changed))
     return note(
         "X007.weights: {figure}: {code} fixed: weights of {n} changed by up to {most} in total "
         "(vertex {vertex})",
@@ -64,6 +74,19 @@ def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
         most=rounded(float(changes.max()), 2),
         vertex=int(changes.argmax()),
     )
+
+
+def _spliced(old: Skin, new: Skin, is_changed: Bools) -> Skin:
+    """Return a skin with the new weights of some vertices (V,) and the old ones of all others."""
+    parts = [(old, ~is_changed[owners(old)]), (new, is_changed[owners(new)])]
+    found = skin_from_entries(
+        old.n_vertices,
+        np.concatenate([owners(skin)[rows] for skin, rows in parts]),
+        np.concatenate([skin.joints[rows] for skin, rows in parts]),
+        np.concatenate([skin.weights[rows] for skin, rows in parts]),
+        old.inverse_bind,
+    )
+    return replace(found, dqs_fractions=old.dqs_fractions, unweighted=new.unweighted)
 
 
 def _repaired(subject: Subject, skin: Skin, finding: Finding) -> Skin | None:

@@ -92,7 +92,7 @@ def weight_faults(figure: Figure, invalid: Invalid) -> Iterator[Fault]:
     if bare.any():
         yield from _bare(mesh, bare)
     if skin.unweighted is not None:
-        yield from _attached(figure, skin, np.flatnonzero(skin.unweighted))
+        yield from _attached(figure, skin, np.flatnonzero(skin.unweighted & known))
 
 
 def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
