@@ -29,15 +29,32 @@ from viewer.media.unfinished import temporary_prefix
 from viewer.version import VERSION
 
 pytest.importorskip("distributed")
+import dask
+
 from viewer.batching.engines import dask_cluster
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+
+_METHOD = "distributed.worker.multiprocessing-method"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forked():
+    """Fork workers from a process that has imported Dask, which takes each of them a second."""
+    with dask.config.set({_METHOD: "forkserver"}):
+        yield
+
+
+@pytest.fixture
+def spawned():
+    """Start workers as batches do, where no test changes it."""
+    with dask.config.set({_METHOD: "spawn"}):
+        yield
 
 
 @pytest.fixture(scope="module")
 def two_workers(tmp_path_factory):
     """A cluster of two worker processes, of which the second declares a GPU."""
-    import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
     common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None,
@@ -118,7 +135,7 @@ def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path):
     assert 0 < sum(len(pids) > 1 for pids in runs.values()) <= 2 * LONGEST / 0.005
 
 
-def test_items_at_fault_are_found_within_tasks(tmp_path):
+def test_items_at_fault_are_found_within_tasks(spawned, tmp_path):
     some = items(400, crash=200, hang=300, **{"raise": 380})
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in some]
     found = finished(Job(seconds=0.005), some, Limits(2, retries=1, timeout=1.0, cluster="local"))
