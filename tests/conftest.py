@@ -33,6 +33,9 @@ FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
+# Collecting creates few objects that are not kept until the end of the run.
+gc.disable()
+
 # Every run tries the same examples, without a time limit.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile("fixed")
@@ -72,6 +75,7 @@ def pytest_collection_finish() -> None:
     # scan them repeatedly.
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
