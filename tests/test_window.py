@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
 from PIL import Image, ImageGrab
 from x11_clipboard import offer_clipboard, read_clipboard
+from x_server import require, x_server
 
 import viewer
 from viewer.app.view.picks import vertex_at
@@ -37,32 +37,11 @@ DRAFT, FINAL = ("--quality", "draft"), ("--quality", "final")
 @pytest.fixture(scope="module")
 def display():
     """The name of an Xvfb display that only this module uses."""
-    missing = [tool for tool in ("Xvfb", "xdotool") if shutil.which(tool) is None]
-    if missing:
-        text = f"{' and '.join(missing)} not installed"
-        pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
-    reading, writing = os.pipe()
-    command = [
-        "Xvfb",
-        "-displayfd",
-        str(writing),
-        "-screen",
-        "0",
-        "1400x900x24",
-        "-r",  # a key that is released late, on a busy machine, must not repeat
-        "-noreset",  # a server that resets when its last client disconnects refuses the next one
-        "-nolisten",
-        "tcp",
-    ]
-    server = subprocess.Popen(
-        command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    os.close(writing)
-    with os.fdopen(reading) as stream:
-        number = stream.readline().strip()
-    yield f":{number}"
-    server.terminate()
-    server.wait(10)
+    require("Xvfb", "xdotool")
+    # A key that is released late, on a busy machine, must not repeat (-r). A server that resets
+    # when its last client disconnects refuses the next one (-noreset).
+    with x_server("1400x900", "-r", "-noreset") as (_, name):
+        yield name
 
 
 @pytest.fixture(scope="module")

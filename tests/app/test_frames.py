@@ -1,7 +1,6 @@
 """Frames of the window: their pace, what is computed for them, and a display that is lost."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from x_server import x_server
 
 from viewer.app.actors.following import toggle_following
 from viewer.app.pace import Pace
@@ -179,20 +179,8 @@ sys.exit(run(sys.argv[3:]))
 @pytest.fixture
 def server():
     """The process and display name of a separate Xvfb."""
-    if shutil.which("Xvfb") is None:
-        text = "Xvfb not installed"
-        pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
-    reading, writing = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
-    process = subprocess.Popen(
-        command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    os.close(writing)
-    with os.fdopen(reading) as stream:
-        number = stream.readline().strip()
-    yield process, f":{number}"
-    process.kill()
-    process.wait(10)
+    with x_server("800x600") as found:
+        yield found
 
 
 def ended(server, tmp_path, word="", program=PROGRAM):

@@ -264,3 +264,24 @@ def test_poster_is_shown_until_the_view_has_started(browser, tmp_path, poster):
     browser.run("new Promise(done => setTimeout(done, 300))")
     alt = "[document.querySelector('#poster').alt, document.querySelector('#poster').naturalWidth]"
     assert browser.run(alt) == ["name: 3D view", poster[0]]
+
+
+@needs_chromium
+def test_page_without_webgl_shows_its_picture_and_no_controls_that_do_nothing(browser, tmp_path):
+    figure = random_figure(np.random.default_rng(1), 4)
+    export(Selection([Part(Actor(figure))]), tmp_path / "a.html")
+    without = "HTMLCanvasElement.prototype.getContext = () => null"
+    script = browser.send("Page.addScriptToEvaluateOnNewDocument", source=without)
+    try:
+        browser.send("Page.navigate", url=(tmp_path / "a.html").as_uri())
+        browser.run(
+            "new Promise(done => document.readyState === 'complete' ? done()"
+            " : addEventListener('load', done))"
+        )
+        browser.run("viewer.ready.catch(() => null)")
+        hidden = "['panels', 'timeline'].map(id => document.getElementById(id).hidden)"
+        assert browser.run(hidden) == [True, True]
+        assert "has no WebGL 2" in browser.run("document.getElementById('message').textContent")
+        assert browser.run("document.getElementById('poster').naturalWidth") == 64
+    finally:
+        browser.send("Page.removeScriptToEvaluateOnNewDocument", **script)

@@ -231,9 +231,28 @@ class Figure {
     return rows;
   }
 
+  // The same, read from a copy once the graphics card has finished: nothing waits for it.
+  async readPosedLater() {
+    const gl = this.gl, rows = new Float32Array(6 * this.nVertices), copy = gl.createBuffer();
+    gl.bindBuffer(gl.COPY_READ_BUFFER, this.posed);
+    gl.bindBuffer(gl.COPY_WRITE_BUFFER, copy);
+    gl.bufferData(gl.COPY_WRITE_BUFFER, rows.byteLength, gl.STREAM_READ);
+    gl.copyBufferSubData(gl.COPY_READ_BUFFER, gl.COPY_WRITE_BUFFER, 0, 0, rows.byteLength);
+    gl.bindBuffer(gl.COPY_READ_BUFFER, null);
+    const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    do await new Promise((next) => setTimeout(next));
+    while (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED);
+    gl.deleteSync(done);
+    gl.bindBuffer(gl.COPY_WRITE_BUFFER, copy);
+    gl.getBufferSubData(gl.COPY_WRITE_BUFFER, 0, rows);
+    gl.deleteBuffer(copy);
+    return rows;
+  }
+
   // Positions and normals (V, 3) of the figure's vertices in its own space.
-  posedVertices() {
-    const rows = this.readPosed(), positions = [], normals = [];
+  async posedVertices() {
+    const rows = await this.readPosedLater(), positions = [], normals = [];
     const [scale, offset] = [this.model[0], this.model.slice(12, 15)];
     this.sources.forEach((v, row) => {
       positions[v] = [0, 1, 2].map((i) => scale * (rows[6 * row + i] + this.center[i]) + offset[i]);

@@ -24,6 +24,7 @@ class Page {
     if (header.wipes) this.figures.forEach((each, i) => this.setSide(each, i ? "right" : "left"));
     this.panels.choose();
     this.panels.readAddress();
+    element("panels").hidden = false;
     this.messages = new Messages(this);
     this.change();
   }
@@ -201,6 +202,6 @@ window.viewer = {
   ready,
   seek: (time) => ready.then((page) => page.seek(time)),
   play: (starts = true) => ready.then((page) => page.play(starts)),
-  positions: (index = 0) => ready.then((page) => page.vertices(index).positions),
-  normals: (index = 0) => ready.then((page) => page.vertices(index).normals),
+  positions: async (index = 0) => (await (await ready).vertices(index)).positions,
+  normals: async (index = 0) => (await (await ready).vertices(index)).normals,
 };
