@@ -7,6 +7,7 @@ import runpy
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,7 +30,14 @@ from viewer.rigs.inspection.explanation import explain, explanation_text
 from viewer.rigs.kinematics import posed_skeleton
 from viewer.rigs.skinning import METHODS, Skinning
 
+MANUAL = Path(viewer.__file__).parent / "manual" / "plugins.md"
 TRIANGLE = "OFF\n3 1 3\n0 0 0\n1 0 0\n0 2 0\n3 0 1 2\n"
+
+
+def manual_code(heading):
+    """Return the example of a section of the manual, which runs as it is printed."""
+    section = MANUAL.read_text("utf-8").split(f"\n## {heading}\n")[1]
+    return re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
 
 
 @pytest.fixture
@@ -214,14 +222,9 @@ def test_wrong_quantities_are_refused(text, message, install):
 def test_command_of_a_plugin_runs(install, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     place = install("tools", [("commands", "count-joints", "tool_one")])
-    (place / "tool_one.py").write_text(
-        "import viewer\n"
-        "def add_arguments(parser):\n    parser.add_argument('files', nargs='*')\n"
-        "def run(arguments):\n"
-        "    print(viewer.load(*arguments.files)[0].figure.skeleton.n_joints)\n    return 0\n"
-    )
+    (place / "tool_one.py").write_text(manual_code("A command"))
     assert run(["count-joints", "body"]) == 0
-    assert capsys.readouterr().out == "24\n"
+    assert capsys.readouterr().out == f"{viewer.load('body')[0]}\n"
     assert run(["--no-plugins", "count-joints", "body"]) == 2
 
 
@@ -255,23 +258,14 @@ def test_overview_lists_commands_of_plugins(install, capsys):
     assert "tidy" not in capsys.readouterr().out
 
 
-EXPORTER = """
-import json
-from viewer.diagnostics import note
-from viewer.exporters import Exporter
-EXPORTER = Exporter("Vertex list", (".vl",), "vertices", "all else", {STORES}, needs="mesh")
-def export(selection, path, options):
-    places = selection.part.actor.vertices(time=0.0)
-    {WRITE}
-    return [note("PVL: {n} vertices", path, n=len(places))]
-"""
-
-
 WRITE = "path.write_text(json.dumps(places.tolist()))"
+STORES = 'frozenset({"pose"})'
 
 
-def write_exporter(place, stores="frozenset({'pose'})", write=WRITE):
-    (place / "lists.py").write_text(EXPORTER.replace("{STORES}", stores).replace("{WRITE}", write))
+def write_exporter(place, stores=STORES, write=WRITE):
+    text = manual_code("An exporter")
+    assert STORES in text and WRITE in text
+    (place / "lists.py").write_text(text.replace(STORES, stores).replace(WRITE, write))
 
 
 def test_exporter_of_a_plugin_writes_its_suffix(install, tmp_path, monkeypatch, capsys):
@@ -405,24 +399,9 @@ def test_wrong_codes_of_a_check_are_refused(codes, message, install, tmp_path, c
     assert line.startswith(f"viewer: plug-in names 0.1 (checks names): {message}")
 
 
-TOOL = """
-import numpy as np
-from viewer.formats.video_mocap.numbers import rows
-from viewer.formats.video_mocap.results import Results, Track
-from viewer.rigs.bodies.smpl_family import FAMILY
-def recognises(archive):
-    return archive.has("my_turns")
-def read(source, archive):
-    turns = rows(archive, "my_turns", (None, 72)).reshape(-1, 24, 3)
-    track = Track(np.arange(len(turns)), FAMILY[24].names, turns, np.zeros((len(turns), 3)))
-    return RESULTS
-"""
-
-
 def test_tool_of_a_plugin_reads_its_results(install, tmp_path):
     place = install("mine", [("tools", "mine", "tool_mine"), ("tools", "romp", "tool_mine")])
-    results = 'Results("Mine", "SMPL", {"world": {7: track}}, {"world": "y"}, frame_rate=50.0)'
-    (place / "tool_mine.py").write_text(TOOL.replace("RESULTS", results))
+    (place / "tool_mine.py").write_text(manual_code("A tool of video motion capture"))
     turns = np.zeros((5, 72))
     turns[:, 3 * 16 + 2] = np.linspace(0.0, 1.0, 5)  # joint 16 of SMPL is the left shoulder
     np.savez(tmp_path / "a.npz", my_turns=turns)
@@ -435,7 +414,7 @@ def test_tool_of_a_plugin_reads_its_results(install, tmp_path):
 
 def test_wrong_results_of_a_tool_are_refused(install, tmp_path):
     (install("mine", [("tools", "mine", "tool_bad")]) / "tool_bad.py").write_text(
-        TOOL.replace("RESULTS", "3")
+        re.sub(r"return Results.*", "return 3", manual_code("A tool of video motion capture"))
     )
     np.savez(tmp_path / "a.npz", my_turns=np.zeros((5, 72)))
     with pytest.raises(PluginError, match=r"mine 0.1 \(tools mine\): expected Results from read"):
@@ -443,18 +422,13 @@ def test_wrong_results_of_a_tool_are_refused(install, tmp_path):
 
 
 @pytest.mark.slow
-def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install):
+def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install, monkeypatch):
     from app.driver import Driver
 
     from viewer.app.layout import is_open, set_open
 
     place = install("mine", [("panels", "notes", "panel_notes"), ("panels", "bad", "panel_bad")])
-    (place / "panel_notes.py").write_text(
-        "from imgui_bundle import imgui\n"
-        "texts = []\n"
-        "def draw(state):\n"
-        "    imgui.text(state.actor.name); texts.append(state.actor.name)\n"
-    )
+    (place / "panel_notes.py").write_text(manual_code("A panel"))
     (place / "panel_bad.py").write_text(
         "from imgui_bundle import imgui\n"
         "def draw(state):\n    imgui.begin_child('x', (0, 0)); imgui.tree_push('y'); 1 / 0\n"
@@ -464,7 +438,17 @@ def test_panel_of_a_plugin_is_drawn_once_it_is_opened(install):
         assert "panel_notes" not in sys.modules and not is_open(hand.state, "notes")
         hand.menu("menu Window", "notes (mine 0.1)")
         hand.step(3)
-        assert sys.modules["panel_notes"].texts[-1] == "fox"
+        assert is_open(hand.state, "notes") and not hand.state.error
+        texts, panel = [], sys.modules["panel_notes"]
+        monkeypatch.setattr(
+            panel, "imgui", SimpleNamespace(text=texts.append, button=lambda _: len(texts) == 1)
+        )
+        hand.step(3)
+        assert texts == ["fox"] * 3
+        np.testing.assert_allclose(hand.state.actor["pelvis"], [0.0, 0.5, 0.0], atol=1e-12)
+        hand.key("z", "ctrl")
+        hand.step(2)
+        np.testing.assert_allclose(hand.state.actor["pelvis"], 0.0, atol=1e-12)
         set_open(hand.state, "bad", True)
         hand.step(3)
         assert "plug-in mine 0.1 (panels bad): cannot be drawn: ZeroDivision" in hand.state.error
@@ -521,12 +505,8 @@ def test_existing_folders_are_kept(tmp_path, monkeypatch, capsys):
     assert "mine: exists; expected a new folder" in capsys.readouterr().err
 
 
-MANUAL = Path(viewer.__file__).parent / "manual" / "plugins.md"
-
-
 def strongest_method():
-    """The skinning method of the manual, whose code is run as it is printed."""
-    return re.search(r"```python\n(.*?)```", MANUAL.read_text("utf-8"), re.DOTALL)[1]
+    return manual_code("A skinning method")
 
 
 def add_method(install, text, name="strongest"):
