@@ -257,6 +257,65 @@ def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
     assert_allclose(paths[1], legs[1] / legs[0] * np.array(forward), rtol=0, atol=1e-3)
 
 
+HANDLESS = """
+Hips 0 1 0
+ Spine 0 0.4 0
+  LeftArm 0.2 0.1 0
+   LeftForeArm 0.3 0 0
+    end {0} 0 {1}
+  RightArm -0.2 0.1 0
+   RightForeArm -0.3 0 0
+    end -{0} 0 {1}
+ LeftUpLeg 0.1 0 0
+  LeftLeg 0 -0.5 0
+   end 0 -0.4 0
+ RightUpLeg -0.1 0 0
+  RightLeg 0 -0.5 0
+   end 0 -0.4 0
+"""
+
+
+def bvh_of(table: str) -> str:
+    """Return a BVH file of one frame at rest of an indented list of names and offsets."""
+    lines, depth, count = ["HIERARCHY"], 0, 0
+    for line in table.strip("\n").split("\n"):
+        deep = len(line) - len(line.lstrip())
+        lines += ["}"] * (depth - deep)
+        name, *offset = line.split()
+        kind = "ROOT" if deep == 0 else "End Site" if name == "end" else "JOINT"
+        lines.append(f"{kind} {'' if name == 'end' else name} {{ OFFSET {' '.join(offset)}")
+        if name != "end":
+            count += 6 if deep == 0 else 3
+            place = "6 Xposition Yposition Zposition" if deep == 0 else "3"
+            lines.append(f"CHANNELS {place} Zrotation Xrotation Yrotation")
+        depth = deep + 1
+    frames = f"MOTION\nFrames: 1\nFrame Time: 0.04\n0 1 0{' 0' * (count - 3)}\n"
+    return "\n".join([*lines, "}" * depth, frames])
+
+
+@pytest.mark.parametrize(("length", "is_wrist"), [(0.25, True), (0.05, False)])
+def test_end_sites_of_forearms_and_shins_without_hands_and_feet_are_followed(
+    tmp_path, length, is_wrist
+):
+    """Without a wrist, elbows kept the bend of the figure's own rest pose."""
+    hero, path = tmp_path / "hero.glb", tmp_path / "a.bvh"
+    hero.write_bytes(character_of(RIGGED).glb())
+    # Elbows are bent forwards by atan(3 / 4).
+    path.write_text(bvh_of(HANDLESS.format(0.8 * length, 0.6 * length)))
+    scene = load(path, motion=MotionSettings(model=hero))
+    (actor,) = scene.actors
+    pose_actors([actor], 0.0)
+    joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+    places = dict(zip(actor.figure.skeleton.names, joints, strict=True))
+    forearm = (places["left_wrist"] - places["left_elbow"]) / 0.5
+    assert_allclose(forearm, [0.8, 0, 0.6] if is_wrist else [1, 0, 0], rtol=0, atol=1e-6)
+    shin = (places["left_ankle"] - places["left_knee"]) / 0.8
+    assert_allclose(shin, [0, -1, 0], rtol=0, atol=1e-6)
+    (driven,) = [note for note in scene.diagnostics if note.key.startswith("F007.joints-matched")]
+    # Hips, spine and four joints of the arms and legs each, with their ends.
+    assert driven.values["n"] == (14 if is_wrist else 12)
+
+
 def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tmp_path):
     """The clip used to move only its own skeleton, with a note that --model has no effect."""
     hero, skel, anim = tmp_path / "hero.glb", tmp_path / "a.skel", tmp_path / "a.anim"

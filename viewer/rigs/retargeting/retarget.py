@@ -33,7 +33,7 @@ from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.joint_map import JointMap
 from viewer.rigs.retargeting.joint_matches import Matches, match_joints
-from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
 from viewer.rigs.retargeting.rest_alignment import (
     RestPose,
     alignment,
@@ -54,6 +54,9 @@ _FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
 # Cosine of the maximum angle between the up axis and the legs of a standing person, from the pelvis
 # to the feet. The legs of some files, such as those of CMU, are 20 degrees apart in the zero pose.
 _UPRIGHT = np.cos(np.radians(40.0))
+# Lengths that forearms and shins may have, relative to upper arms and thighs. End Sites that some
+# programs put next to the joint, or anywhere, are no wrists.
+_LOWER = (0.5, 2.0)
 _ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 
 
@@ -76,7 +79,7 @@ def retarget(
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
         raise RigError(note("F004.no-skeleton: {figure} has no skeleton to animate", figure=named))
-    motion = _in_path_unit(motion)
+    motion = _with_tips(_in_path_unit(motion))
     source = motion.figure.require_skeleton()
     matches = match_joints(source, target, joint_map, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
@@ -189,6 +192,60 @@ def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
     left = None if (scales == usual).all() else scales / usual
     place = clip.figure_translations
     return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
+
+
+def _with_tips(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return a motion whose forearms and shins without a hand or foot end in a joint.
+
+    Without one, the direction of the bone is unknown: the figure's elbows and knees would keep the
+    bend of its rest pose, and feet could not be planted. The End Sites of a BVH file show it.
+    """
+    skeleton, clip = motion.figure.require_skeleton(), motion.clip
+    if skeleton.boxes is None or not skeleton.boxes_from_bones:
+        return motion
+    meanings, has_child = joint_meanings(skeleton), set(skeleton.parents.tolist())
+    owners, tips, names = list[int](), list[Floats](), list[str]()
+    for _, middle, end in LIMBS:
+        if middle not in meanings or end in meanings:
+            continue
+        joint = meanings.index(middle)
+        # An End Site is at twice the centre of its joint's box.
+        tip = skeleton.boxes[joint].sum(axis=0)
+        length = float(np.linalg.norm(skeleton.rest_translations[joint]))
+        low, high = _LOWER
+        if joint in has_child or not low * length < np.linalg.norm(tip) < high * length:
+            continue
+        owners.append(joint)
+        tips.append(tip)
+        names.append(f"{skeleton.names[joint]}:{'hand' if end.endswith('wrist') else 'foot'}")
+    if not owners:
+        return motion
+    added = len(owners)
+
+    def extended(rows: Floats | None, last: Floats) -> Floats | None:
+        if rows is None:
+            return None
+        return np.concatenate([rows, np.tile(last, (len(rows), added, 1))], axis=1)
+
+    still, one = np.array([0.0, 0.0, 0.0, 1.0]), np.ones(3)
+    skeleton = replace(
+        skeleton,
+        names=(*skeleton.names, *names),
+        parents=np.append(skeleton.parents, owners).astype(np.int32),
+        rest_translations=np.concatenate([skeleton.rest_translations, tips]),
+        rest_rotations=np.concatenate([skeleton.rest_rotations, np.tile(still, (added, 1))]),
+        rest_scales=np.concatenate([skeleton.rest_scales, np.tile(one, (added, 1))]),
+        boxes=None,
+    )
+    rotations = extended(clip.rotations, still)
+    assert rotations is not None  # clips of skeletons have rotations
+    clip = replace(
+        clip,
+        rotations=rotations,
+        translations=extended(clip.translations, np.zeros(3)),
+        scales=extended(clip.scales, one),
+    )
+    return replace(motion, figure=replace(motion.figure, skeleton=skeleton), clip=clip)
 
 
 def _target_rotations(job: _Job, worlds: Floats) -> Floats:
