@@ -415,6 +415,20 @@ gupen = pelvis
    you_jiao = right_ankle
     you_jiaozhi = right_foot
 """
+PATCHES = """
+Hips = pelvis
+ Spine = spine1
+  LeftArm = left_shoulder
+   LeftForeArm = left_elbow
+    LeftElbowPad = -
+ LeftUpLeg = left_hip
+  LeftLeg = left_knee
+   LeftKneePatch = -
+ RightUpLeg = right_hip
+  RightLeg = right_knee
+   RightKneePatch = -
+   RightShoe = right_ankle
+"""
 PAWS = """
 Hips = pelvis
  Spine = spine1
@@ -1266,6 +1280,7 @@ TABLES = {
                                   if name[0] in "左右" else name),
     "chinese in latin letters": CHINESE_LATIN,
     "paws": PAWS,
+    "patches": PATCHES,
     "mixamo in one word": changed(MIXAMO, lambda name: name.replace(":", "")),
     "mixamo behind a path": changed(MIXAMO, lambda name: f"Armature|{name}"),
     "mixamo with a suffix": changed(MIXAMO, lambda name: f"{name.split(':')[1]}_jnt"),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.hand_made import skeleton
 from rigs.retargeting.joint_tables import TABLES
 from rigs.retargeting.two_people import BODY, HIK, figure_of, moving
 
@@ -16,7 +17,12 @@ from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip, full_map, matches_of
 from viewer.rigs.retargeting.joint_map import JointMap
-from viewer.rigs.retargeting.joint_names import canonical_names, other_side, sided_words
+from viewer.rigs.retargeting.joint_names import (
+    canonical_names,
+    joint_meanings,
+    other_side,
+    sided_words,
+)
 from viewer.rigs.retargeting.retarget import retarget
 
 
@@ -39,6 +45,14 @@ def test_program_names_map_to_family_joints(table):
     names, meanings, parents = tree(TABLES[table])
     found = canonical_names(names, parents)
     assert dict(zip(names, found, strict=True)) == dict(zip(names, meanings, strict=True))
+
+
+@pytest.mark.parametrize(("length", "meaning"), [(0.3, "left_ankle"), (0.05, "")])
+def test_joint_next_to_a_knee_is_no_foot(length, meaning):
+    names = ["Hips", "LeftUpLeg", "LeftLeg", "Extra"]
+    offsets = np.array([[0, 1, 0], [0.1, 0, 0], [0, -0.4, 0], [0, -length, 0]])
+    figure = skeleton(np.array([-1, 0, 1, 2]), names=names, offsets=offsets)
+    assert joint_meanings(figure)[3] == meaning
 
 
 @pytest.mark.parametrize("count", [24, 52, 55, 16])

@@ -174,12 +174,18 @@ _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 _FILLERS = {"jnt", "jt", "bn"}  # words for "joint", removed wherever they are
 _HELPERS = ("__", "ORG-")  # prefixes of joints that repeat another one's name
 # Words of joints that are no part of a limb, although they are below it.
-_ASIDE = {"twist", "roll", "end", "nub", "tip", "site", "ik", "pole", "target", "prop", "weapon"}
+_ASIDE = {
+    *("twist", "roll", "end", "nub", "tip", "site", "ik", "pole", "target", "prop", "weapon"),
+    *("patch", "pad", "armor", "armour", "plate", "guard", "muscle", "helper", "corrective"),
+}
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[左右](?=\w)|[^\W\d_A-Za-z]+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
 _FEW = 8  # number of joints below which numbers at the end are part of the names
 _SHARED = 0.6  # fraction of the joints above which a shared first or last word is removed
 _MOST = 2000  # maximum number of joints of a body
+# Length of a forearm or shin, relative to the upper arm or thigh, below which a joint is no hand or
+# foot, but an attachment of the elbow or knee. Those of chibis are at least half as long.
+_SHORT_LOWER = 0.3
 _SPINES = ("spine1", "spine2", "spine3")
 
 LIMBS = tuple(
@@ -259,7 +265,28 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
         named = {joint: HUMAN_BONES[bone] for bone, joint in joints.items() if bone in HUMAN_BONES}
         named |= dict(zip(*_numbered(spine), strict=True))
         return tuple(named.get(joint, "") for joint in range(skeleton.n_joints))
-    return canonical_names(skeleton.names, skeleton.parents)
+    names = canonical_names(skeleton.names, skeleton.parents)
+    near = _near_ends(skeleton, names)
+    return tuple("" if joint in near else name for joint, name in enumerate(names))
+
+
+def _near_ends(skeleton: Skeleton, names: Sequence[str]) -> set[int]:
+    """Return joints called hands or feet by their place that are next to an elbow or knee."""
+    if skeleton.n_joints > _MOST:
+        return set()
+    lengths = np.linalg.norm(skeleton.rest_translations, axis=1)
+    found = set[int]()
+    for upper, middle, end in LIMBS:
+        if not {upper, middle, end} <= set(names):
+            continue
+        start, bend, tip = (names.index(name) for name in (upper, middle, end))
+        above = path_to_root(skeleton.parents, bend)
+        if start not in above or skeleton.parents[tip] != bend:
+            continue
+        upper_length = lengths[above[: above.index(start)]].sum()
+        if lengths[tip] < _SHORT_LOWER * upper_length:
+            found |= {tip, *np.flatnonzero(skeleton.parents == tip).tolist()}
+    return found & joints_by_place(skeleton) if found else found
 
 
 def joints_by_place(skeleton: Skeleton) -> set[int]:
