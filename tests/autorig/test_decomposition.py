@@ -86,7 +86,7 @@ def test_influences_are_limited():
 def test_frames_and_vertices_that_were_not_chosen_are_fitted_too(monkeypatch):
     monkeypatch.setattr("viewer.autorig.decomposition._KEY_FRAMES", 5)
     monkeypatch.setattr("viewer.autorig.decomposition._KEY_VERTICES", 40)
-    monkeypatch.setattr("viewer.autorig.decomposition._CHUNK", 3000)  # many parts
+    monkeypatch.setattr("viewer.rigs.arrays._MOST_NUMBERS", 3000)  # many parts
     rest, positions, _, _ = tube()
     found = decompose(rest, positions, DecompositionSettings(bones=2))
     assert np.linalg.norm(skinned(rest, found) - positions, axis=2).max() < 1e-3 * 3.0

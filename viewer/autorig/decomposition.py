@@ -14,7 +14,6 @@ not grow with them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +22,7 @@ from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError, ViewerError
 from viewer.phrases import printable
 from viewer.progress import part_of_work, report_fraction
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, blocks_of_rows
 from viewer.rigs.geometry.rotation import nearest_rotations
 from viewer.rigs.geometry.transform import affine_matrices
 
@@ -43,7 +42,6 @@ _CANDIDATES = 10  # bones that may move a vertex: those that move it best alone
 _NOISE = 1e-6  # error that is rounding: no weight is chosen by it
 _HELD = 1e-6  # of a rotation towards the last one, as a fraction of its own moments
 _IDLE = 1e-3  # sum of weights below which a bone is removed, in vertices
-_CHUNK = 1 << 22  # numbers in a temporary array
 MOST_BONES = 100
 """Bones up to which their number grows by itself."""
 _MANY = 10_000  # bones that may be asked for
@@ -105,7 +103,7 @@ def decompose(
     with part_of_work(span=(0.0, 0.7)):
         moved = _grown(unit.inside(rest), keys, vertices, how)
     weights = np.empty((len(rest), moved.shape[1]))
-    rows = _rows_within(len(rest), 3 * len(frames) * moved.shape[1])
+    rows = blocks_of_rows(len(rest), 3 * len(frames) * moved.shape[1])
     for part in rows:
         report_fraction(0.7 + 0.1 * part.start / len(rest), "weights")
         weights[part] = _weights(unit.inside(rest[part]), keys[:, part], moved, how.max_influences)
@@ -259,7 +257,7 @@ def _weights(u: Floats, v: Floats, moved: Floats, most: int) -> Floats:
     """Return the best weights (V, B) for given transforms, at most ``most`` for each vertex."""
     count = min(_CANDIDATES, moved.shape[1])
     weights = np.zeros((len(u), moved.shape[1]))
-    for part in _rows_within(len(u), 10 * count**2 + 3 * len(moved) + 4 * moved.shape[1]):
+    for part in blocks_of_rows(len(u), 10 * count**2 + 3 * len(moved) + 4 * moved.shape[1]):
         # As the weights sum to 1, the error is sum_b w_b d_b with d_b = M_b u - v, so its square is
         # w^T G w with G_bc = d_b . d_c over all frames.
         products = _Products(u[part], v[:, part], moved)
@@ -419,7 +417,7 @@ def _all_transforms(unit: _Unit, rest: Floats, positions: Floats, weights: Float
     """Return the transforms of all frames (F, B, 4, 4), in the space of the mesh."""
     u = unit.inside(rest)
     moments, found = _Moments(u, weights), np.empty((len(positions), weights.shape[1], 4, 4))
-    for part in _rows_within(len(positions), 3 * len(rest) + 64 * weights.shape[1]):
+    for part in blocks_of_rows(len(positions), 3 * len(rest) + 64 * weights.shape[1]):
         report_fraction(part.start / len(positions), "motion")
         v = unit.inside(positions[part])
         start = _aligned(u, v, weights)
@@ -434,10 +432,3 @@ def _squared_errors(u: Floats, v: Floats, weights: Floats, moved: Floats) -> Flo
     )
     apart = skinned.reshape(len(u), len(v), 3).transpose(1, 0, 2) - v
     return np.asarray(np.einsum("fni,fni->fn", apart, apart))
-
-
-def _rows_within(count: int, each: int) -> Iterator[slice]:
-    """Yield slices of rows, as many at a time as fit in a temporary array."""
-    step = max(1, _CHUNK // max(each, 1))
-    for first in range(0, count, step):
-        yield slice(first, min(first + step, count))

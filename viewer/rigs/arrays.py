@@ -13,6 +13,8 @@ from viewer.phrases import printable
 
 Item = TypeVar("Item", bound=np.generic)
 
+_MOST_NUMBERS = 1 << 22  # in a temporary array
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
@@ -31,6 +33,13 @@ def runs_of(flags: Bools) -> list[tuple[int, int]]:
     """Return the runs of True as half-open ranges: [F, T, T, F] has the one run (1, 3)."""
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def blocks_of_rows(count: int, width: int) -> Iterator[slice]:
+    """Yield slices of ``count`` rows, as many at a time as fit into a temporary array."""
+    step = max(1, _MOST_NUMBERS // max(width, 1))
+    for first in range(0, count, step):
+        yield slice(first, min(first + step, count))
 
 
 class Deferred:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import OutputError, RigError, reason_of
 from viewer.phrases import file_size
 from viewer.progress import report
-from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.arrays import Floats, Ints, blocks_of_rows
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import bounding_box, box_size
 from viewer.rigs.motion.evaluation import Frames, JointMotion, frames_of, pose_of
@@ -23,7 +23,6 @@ from viewer.rigs.scene import Actor
 from viewer.rigs.skinning import deform, posed_mesh
 
 _IN_MEMORY = 512_000_000  # bytes of positions; more are kept in a temporary file
-_CHUNK = 1 << 22  # numbers in a temporary array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +163,7 @@ def frame_errors(
     count = moving.n_frames
     rms, largest = np.empty(count), np.empty(count)
     worst = np.empty(count, dtype=np.int32)
-    for rows in chunks(count, 3 * moving.positions.shape[1]):
+    for rows in blocks_of_rows(count, 3 * moving.positions.shape[1]):
         report(rows.start, count, "frames", "measuring")
         wanted = moving.positions[rows]
         wanted = wanted if vertices is None else wanted[:, vertices]
@@ -186,10 +185,3 @@ def posed_rows(
         return np.stack([deform(figure, pose)[0] for pose in poses])
 
     return skinned
-
-
-def chunks(count: int, each: int) -> Iterator[slice]:
-    """Yield slices of rows, as many at a time as fit into a temporary array."""
-    step = max(1, _CHUNK // max(each, 1))
-    for first in range(0, count, step):
-        yield slice(first, min(first + step, count))
