@@ -34,7 +34,7 @@ GOAL = 0.9
 class _Dropped:
     """A sink that drops all frames."""
 
-    workers, n_samples = 1, 0
+    workers, n_samples, n_kept, notes = 1, 0, 0, ()
 
     def look(self, pixels: Bytes) -> None:
         pass

@@ -426,9 +426,10 @@ def draw_sequence(drawing: Drawing, scene: Scene) -> str:
     points, recording.box = frame_motion(recording)
     points = with_cameras(scene, options, points, framed_poses(recording))
     aspect = seen_aspect(camera_of(view, scene, points, size), points)
-    sink = _sink(request, recording, outputs, size, aspect)
-    print_warnings([*notes, *follow_notes(view, scene), *getattr(sink, "notes", [])])
-    recording.size = frame_size = getattr(sink, "cell", size)
+    recording.size = size
+    sink = _sink(request, recording, outputs, aspect)
+    print_warnings([*notes, *follow_notes(view, scene), *sink.notes])
+    frame_size = recording.size
     recording.camera = camera_of(view, scene, points, frame_size)
     if view.distance is None and view.look_at is None:
         shape = frame_size[0] / frame_size[1]
@@ -446,9 +447,9 @@ def draw_sequence(drawing: Drawing, scene: Scene) -> str:
                 for _ in steps:
                     pass
         except BaseException:  # also Ctrl-C
-            kept = getattr(sink, "n_written", 0)
-            if kept:
-                print_warnings([f"{kept} of {len(outputs)} pictures were written, and are kept"])
+            if sink.n_kept:
+                kept = f"{sink.n_kept} of {len(outputs)} pictures were written, and are kept"
+                print_warnings([kept])
             raise
         print_warnings(offscreen.renderer.notes)
     return _summary(request, recording, outputs, sink, request.skips(asked.frames.fps))
@@ -458,9 +459,10 @@ def _sink(
     request: Request,
     recording: Recording,
     outputs: list[Path],
-    size: tuple[int, int],
     aspect: float,
 ) -> PictureSink | SheetSink | VideoSink:
+    """Return the sink of the frames, which have the size of the cells in a contact sheet."""
+    size = recording.size
     if request.kind == "video":
         from viewer.media.video import VideoSink
 
@@ -469,7 +471,9 @@ def _sink(
     from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if request.kind == "sheet":
-        return SheetSink(outputs[0], size, recording.numbers, min(max(aspect, _NARROW), _WIDE))
+        sheet = SheetSink(outputs[0], size, recording.numbers, min(max(aspect, _NARROW), _WIDE))
+        recording.size = sheet.cell
+        return sheet
     return PictureSink(outputs)
 
 

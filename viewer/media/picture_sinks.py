@@ -24,6 +24,7 @@ class PictureSink:
     """Writes an image for every frame, each atomically; they are kept if the run is aborted."""
 
     n_samples = 0
+    notes = ()
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths, self._written = paths, list[int]()
@@ -35,7 +36,7 @@ class PictureSink:
         return sum(path.stat().st_size for path in self.paths if path.is_file())
 
     @property
-    def n_written(self) -> int:
+    def n_kept(self) -> int:
         """Number of images written so far."""
         return len(self._written)
 
@@ -59,7 +60,8 @@ class SheetSink:
 
     # Gutters and unused cells are white, or transparent if the frames are transparent.
 
-    n_samples = 0
+    n_samples = n_kept = 0
+    notes = ()
 
     def __init__(
         self,

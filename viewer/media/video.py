@@ -48,6 +48,8 @@ class VideoSink:
     transparent pixels; if the format has no alpha, they are composited on black.
     """
 
+    n_kept = 0
+
     def __init__(
         self,
         path: Path,

@@ -114,6 +114,14 @@ class Sink(Protocol):
     def n_samples(self) -> int:
         """Number of frames, spread over the recording, to pass to ``look`` first."""
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """Messages about what the format changes, one line each."""
+
+    @property
+    def n_kept(self) -> int:
+        """Number of frames that stay if the recording is aborted."""
+
     def look(self, pixels: Bytes) -> None:
         """Inspect a sample frame before any frame is written, to choose the palette of a GIF.
 

@@ -495,7 +495,6 @@ def _recording_steps(
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink = _sink(settings, files, recording)
-    recording.size = getattr(sink, "cell", recording.size)
     renderer = Renderer(programs)
     renderer.ghost = ghost
     try:
@@ -503,14 +502,13 @@ def _recording_steps(
         with contextlib.closing(record(recording, renderer, sink)) as steps:
             yield from steps
     except (ViewerError, GeneratorExit):
-        kept = getattr(sink, "n_written", 0)
-        if kept:
-            state.say(f"{kept} of {len(files)} pictures were written, and are kept")
+        if sink.n_kept:
+            state.say(f"{sink.n_kept} of {len(files)} pictures were written, and are kept")
         raise
     finally:
         renderer.release()
     name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
-    notes = [*getattr(sink, "notes", []), *renderer.notes]
+    notes = [*sink.notes, *renderer.notes]
     width, height = recording.size
     return [f"Saved {name}: {recording.n_frames} frames, {width} x {height}", *notes]
 
@@ -529,13 +527,15 @@ def _numbered(path: Path, numbers: Sequence[int]) -> list[Path]:
 
 
 def _sink(settings: RecordSettings, files: list[Path], recording: Recording) -> Sink:
-    """Return the sink of the frames; that of a contact sheet has the size of its cells."""
+    """Return the sink of the frames, which have the size of the cells in a contact sheet."""
     from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if settings.kind == "pictures":
         return PictureSink(files)
     if settings.kind == "sheet":
-        return SheetSink(files[0], recording.size, recording.numbers)
+        sheet = SheetSink(files[0], recording.size, recording.numbers)
+        recording.size = sheet.cell
+        return sheet
     from viewer.media.video import VideoSink
 
     quality, is_transparent = settings.quality, settings.is_transparent
