@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._options import GAPS, GapHandling
 from viewer.phrases import agree, listed
-from viewer.rigs.arrays import Bools, Floats, runs_of
-from viewer.rigs.geometry.quaternion import slerp
+from viewer.rigs.arrays import Bools, runs_of
 from viewer.rigs.motion.evaluation import Frames
-
-Indices = NDArray[np.intp]
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 
 _CLOSED: dict[str, str] = {
     "hold": "{poses}",
@@ -85,30 +83,25 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     """Return frames whose gaps are interpolated, or hold the frame before; ends are held."""
     if frames.present.all():
         return frames
-    there = np.flatnonzero(frames.present)
     every = np.arange(frames.n_frames)
-    place = np.searchsorted(there, every, side="right")
-    before = there[np.clip(place - 1, 0, len(there) - 1)]
-    after = there[np.clip(place, 0, len(there) - 1)] if interpolate else before
-    span = after - before
-    fraction = np.divide(every - before, span, out=np.zeros(len(every)), where=span > 0).clip(
-        0.0, 1.0
-    )
-    moves = np.flatnonzero(fraction > 0.0)
-    rotations = frames.rotations[before]
-    rotations[moves] = slerp(
-        rotations[moves], frames.rotations[after[moves]], fraction[moves, None]
-    )
-    weights, scales = frames.shape_weights, frames.scales
+    rows = np.where(frames.present, every, -1)
+    if not interpolate:
+        rows = np.maximum.accumulate(np.where(rows < 0, np.argmax(frames.present), rows))
+    clip = SampledClip("", Timing(1.0, rows.astype(np.int32)), *frames.arrays)
+    found = clip.sample(None, every.astype(np.float64), interpolate=True)
+    # The clip has both.
+    assert found.figure_translations is not None and found.figure_scales is not None
     return replace(
         frames,
-        present=np.ones(len(every), dtype=np.bool_),
-        rotations=rotations,
-        translations=_line(frames.translations, before, after, fraction),
-        scales=scales if len(scales) == 1 else _line(scales, before, after, fraction),
-        shape_weights=weights if len(weights) == 1 else _line(weights, before, after, fraction),
-        figure_translations=_line(frames.figure_translations, before, after, fraction),
-        figure_scales=_line(frames.figure_scales, before, after, fraction),
+        present=found.present,
+        rotations=found.rotations,
+        translations=found.translations,
+        scales=frames.scales if len(frames.scales) == 1 else found.scales,
+        shape_weights=frames.shape_weights
+        if len(frames.shape_weights) == 1
+        else found.shape_weights,
+        figure_translations=found.figure_translations,
+        figure_scales=found.figure_scales,
     )
 
 
@@ -121,8 +114,3 @@ def kept_gaps(
     if not gaps or gaps == "split" or present.all() or not present.any():
         return frames, []
     return filled(frames, gaps == "interpolate"), gaps_note(present, first_frame, gaps)
-
-
-def _line(rows: Floats, before: Indices, after: Indices, fraction: Floats) -> Floats:
-    weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
-    return rows[before] + weight * (rows[after] - rows[before])
