@@ -42,7 +42,13 @@ def found(shape, facing=None, up=None, **how):
 
 def half_resolution(monkeypatch):
     """Use 48 voxels along the longest side, for speed: in shapes that nearly fill their boxes."""
-    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 48))
+    resolution(monkeypatch, 48)
+
+
+def resolution(monkeypatch, voxels):
+    monkeypatch.setattr(
+        curve_skeleton, "solid_within", lambda *mesh, **how: solid_of(*mesh[:2], voxels, **how)
+    )
 
 
 def joints_of(skeleton):
@@ -112,7 +118,7 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
 
 
 def test_legs_of_a_wide_trunk_are_legs_of_both_sides(monkeypatch):
-    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 64))
+    resolution(monkeypatch, 64)
     # As of a crab: the legs meet at two hubs inside the trunk, to the left and right of its root.
     trunk = pipe([(-0.8, 0.6, 0), (0.8, 0.6, 0)], 0.45, around=16)
     legs = [
@@ -527,7 +533,7 @@ def test_chain_of_many_small_parts_is_rigged_and_the_limit_said(monkeypatch):
 
 
 def test_small_parts_of_a_limb_have_hinges_too(monkeypatch):
-    monkeypatch.setattr(curve_skeleton, "solid_within", lambda *mesh: solid_of(*mesh[:2], 64))
+    resolution(monkeypatch, 64)
     trunk = pipe([(0, 0, -1.2), (0, 0, 1.2)], 1.2, around=24)
     corners = np.array([(1.1, 0, 0), (1.7, 0, 0), (2.3, 0, 0), (2.9, 0, 0)])
     gap = [(0.0, 0, 0), (-0.03, 0, 0)]  # or their ends would be welded

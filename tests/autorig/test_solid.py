@@ -58,6 +58,31 @@ def test_open_side_of_a_box_is_closed():
     assert volume(solid) == pytest.approx(1.0, rel=1e-6)
 
 
+def crate(height, has_floor, turned=(0, 1, 2)):
+    """Return walls of 0.1 around a square of 1, with a floor or without one."""
+    walls = [box([0.0, 0, low], [1, height, low + 0.1]) for low in (0.0, 0.9)]
+    walls += [box([low, 0.0, 0.1], [low + 0.1, height, 0.9]) for low in (0.0, 0.9)]
+    positions, corners = joined(*walls, *[box([0.1, 0, 0.1], [0.9, 0.1, 0.9])] * has_floor)
+    return positions[:, list(turned)], corners if turned == (0, 1, 2) else corners[:, ::-1]
+
+
+@pytest.mark.parametrize("turned", [(0, 1, 2), (1, 0, 2), (0, 2, 1)])
+def test_hollows_with_a_floor_and_deep_ones_are_filled_on_request(turned):
+    for height, has_floor in ((0.3, True), (0.6, False), (1.0, True)):
+        parts = crate(height, has_floor, turned)
+        walls = height * (1.0 - 0.8**2) + 0.8**2 * 0.1 * has_floor
+        assert volume(solid_of(*parts, resolution=40)) == pytest.approx(walls, rel=0.1)
+        filled = solid_of(*parts, resolution=40, fills_hollows=True)
+        assert volume(filled) == pytest.approx(height, rel=0.05)
+
+
+def test_holes_of_frames_stay_open():
+    # Wider than deep, 0.8 to 0.3, and without a floor, as the loop of a handle or a door.
+    parts = crate(0.3, has_floor=False)
+    open_one = solid_of(*parts, resolution=40, fills_hollows=True)
+    assert volume(open_one) == pytest.approx(0.3 * (1.0 - 0.8**2), rel=0.1)
+
+
 def test_solid_agrees_with_winding_numbers():
     positions, triangles = tube()
     solid = solid_of(positions, triangles, resolution=24)

@@ -76,7 +76,7 @@ def enclosed(target: Mesh) -> tuple[Welded, Solid]:
 
     def make() -> tuple[Welded, Solid]:
         mesh = one_sided(weld(target.positions, target.triangles))
-        return mesh, solid_of(mesh.positions, mesh.triangles)
+        return mesh, solid_of(mesh.positions, mesh.triangles, fills_hollows=True)
 
     return _enclosed.get(target, None, make)
 

@@ -806,7 +806,7 @@ def find_skeleton(
     front = alignment.facing or usual
     axis_rotations(source.up, named, front)  # checks the names
     with part_of_work(span=(0.0, 0.4)):
-        solid = solid_within(target.positions, target.triangles, _FINEST)
+        solid = solid_within(target.positions, target.triangles, _FINEST, fills_hollows=True)
     n_stray = _check_one(target, solid)
     parts = parts_of(target, solid)
     where = "" if parts.contact is None else listed([rounded(x) for x in parts.contact.tolist()])

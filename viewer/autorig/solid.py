@@ -4,7 +4,8 @@ Characters are rarely one closed surface: they have holes, overlapping and separ
 sheets. A voxel is inside if the mesh winds around it in most of six directions, so that a hole
 spoils only the directions in which it lies (Nooruddin and Turk 2003 vote on parities in the same
 way; windings also serve parts that overlap). Parts that are thinner than a voxel are added from the
-surface, and separate components are joined across the gaps between them.
+surface, and separate components are joined across the gaps between them. The hollow of a mug or of
+a lamp shade, whose walls have an inner side, is filled on request: its bones are in the middle.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ _SAMPLES = 4.0  # samples of the surface per square of one voxel
 _WIDEST_GAP = 0.1  # longest gap between components that is bridged, as a fraction of the side
 _RAY_STEP = 0.25  # distance of the points of a ray that are looked up, in voxels
 _ROUNDS = 40  # most rounds of bridging
+# Hollows: the fraction of one end that is closed by a floor, or else the depth relative to the
+# width. The hole of a ring or of a frame has no floor and is wider than deep.
+_FLOOR, _DEEP = 0.8, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -130,7 +134,9 @@ class Solid:
         return sparse.csr_array(matrix + matrix.T)
 
 
-def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -> Solid:
+def solid_of(
+    positions: Floats, triangles: Ints, resolution: int = RESOLUTION, fills_hollows: bool = False
+) -> Solid:
     """Return the voxels inside a mesh; ``RigError`` if it encloses none."""
     from scipy import ndimage, spatial
 
@@ -151,6 +157,8 @@ def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -
         report_fraction((axis + 1) / 4.0)
     solid = votes > 3.0  # of six directions
     solid |= _thin_parts(positions, triangles, origin, spacing, solid)
+    if fills_hollows:
+        solid |= _hollows(solid)
     inside = _joined(solid, _WIDEST_GAP * resolution)
     distance = np.asarray(ndimage.distance_transform_edt(inside), dtype=np.float64)
     # The surface is half a voxel before the centre of the nearest voxel outside.
@@ -163,13 +171,18 @@ def solid_of(positions: Floats, triangles: Ints, resolution: int = RESOLUTION) -
 
 
 def solid_within(
-    positions: Floats, triangles: Ints, finest: int = RESOLUTION, most: int = MOST_VOXELS
+    positions: Floats,
+    triangles: Ints,
+    finest: int = RESOLUTION,
+    most: int = MOST_VOXELS,
+    fills_hollows: bool = False,
 ) -> Solid:
     """Return the voxels inside a mesh, as fine as ``finest`` with about ``most`` voxels allows."""
-    solid = solid_of(positions, triangles)
+    solid = solid_of(positions, triangles, fills_hollows=fills_hollows)
     resolution = int(RESOLUTION * (most / len(solid.voxels)) ** (1.0 / 3.0))
     if len(solid.voxels) > most or finest > RESOLUTION:
-        solid = solid_of(positions, triangles, min(max(16, resolution), finest))
+        finer = min(max(16, resolution), finest)
+        solid = solid_of(positions, triangles, finer, fills_hollows)
     return solid
 
 
@@ -264,6 +277,43 @@ def _thin_parts(
         return thin
     near: Bools = ndimage.binary_dilation(thin, np.ones((3, 3, 3))) & surface
     return near
+
+
+def _hollows(solid: Bools) -> Bools:
+    """Return the voxels of hollows that walls enclose all around, with a floor or deep."""
+    from scipy import ndimage
+
+    found = np.zeros_like(solid)
+    for axis in range(3):
+        # In slices across the axis, what is not connected with their corner is enclosed. Walls of
+        # voxels that only share a corner are closed.
+        outside = np.moveaxis(~solid, axis, 0)
+        around = np.zeros((3, 3, 3), dtype=np.bool_)
+        around[1] = ndimage.generate_binary_structure(2, 1)
+        labels, _ = ndimage.label(outside, around)
+        holes = outside & (labels != labels[:, :1, :1])
+        labels, count = ndimage.label(holes)
+        if count == 0:
+            continue
+        numbers = np.arange(count + 1)
+        filled = np.moveaxis(found, axis, 0)
+        closed = []
+        for step in (1, -1):
+            # Of the last voxels of the columns, those before a wall are closed.
+            behind = np.roll(labels, -step, axis=0)
+            ends = holes & (behind != labels)
+            is_wall = ends & ~np.roll(outside, -step, axis=0)
+            n_ends = np.bincount(labels[ends], minlength=count + 1)
+            walls = np.bincount(labels[is_wall], minlength=count + 1)
+            closed.append(walls / np.maximum(n_ends, 1))
+        sizes = [np.bincount(layer.ravel(), minlength=count + 1) for layer in labels]
+        areas = np.max(sizes, axis=0)
+        depths = np.count_nonzero(sizes, axis=0)
+        # A disc of an area A has the width 2 sqrt(A / pi).
+        is_deep = depths >= _DEEP * 2.0 * np.sqrt(areas / np.pi)
+        kept = is_deep | (np.max(closed, axis=0) >= _FLOOR)
+        filled |= np.isin(labels, numbers[1:][kept[1:]])
+    return found
 
 
 def _joined(solid: Bools, widest: float) -> Bools:
