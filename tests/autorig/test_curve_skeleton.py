@@ -346,24 +346,79 @@ def test_foot_has_the_root_in_its_middle_and_no_limb_at_its_rim():
     assert "1 limb," in str(lamp.lines[0])
 
 
+def lathe(profile, around=24):
+    """Return the surface of revolution of a profile (r, y), its ends on the axis."""
+    angles = 2 * np.pi * np.arange(around) / around
+    circle = np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+    positions = np.concatenate([r * circle + [0, y, 0] for r, y in profile])
+    a = np.arange(around * (len(profile) - 1)).reshape(-1, around)
+    b, c, d = np.roll(a, -1, axis=1), np.roll(a, -1, axis=1) + around, a + around
+    return positions, np.concatenate([np.stack([a, c, b], -1), np.stack([a, d, c], -1)]
+                                     ).reshape(-1, 3)  # fmt: skip
+
+
+def test_hollow_shade_has_its_joint_in_the_middle_and_the_foot_ends_in_its_own(tmp_path):
+    shade = lathe([(0.6, 1.1), (0.35, 1.8), (0.32, 1.8), (0.57, 1.1), (0.6, 1.1)])
+    foot = lathe([(1e-3, 0), (0.4, 0), (0.4, 0.08), (1e-3, 0.08)])
+    spokes = [pipe([(-x, 1.75, -z), (x, 1.75, z)], 0.03) for x, z in ((0.34, 0), (0, 0.34))]
+    lamp = united(shade, foot, pipe([(0, 0.04, 0), (0, 1.8, 0)], 0.05), *spokes)
+    result = found(lamp)
+    joints = np.array([*joints_of(result.figure.skeleton).values()])
+    # All joints are on the axis: in the middle of the shade, along the post, and in the foot.
+    assert np.abs(joints[:, [0, 2]]).max() < 0.05
+    assert joints[:, 1].max() > 1.1 and joints[:, 1].min() < 0.15
+    assert not [str(line) for line in result.lines if line.severity == "warning"]
+    mesh = mesh_of(*lamp)
+    rigged = viewer.rig(Actor(Figure("lamp", mesh)), auto=True).actors[0].figure
+    assert len(rigged.skin.starts) == len(lamp[0]) + 1
+
+
+def test_long_trunk_with_a_single_limb_bends():
+    # A fish with a fin on its back: the head is no limb, the tail is one.
+    places, triangles = pipe([(0, 0, -1.2), (0, 0, 1.2)], 1.0, around=24)
+    along = np.clip(places[:, 2:], -1.2, 1.2)
+    places[:, :2] *= np.sqrt(np.maximum(0.003, 1.0 - (along / 1.2) ** 2)) * [0.3, 0.45]
+    body = np.concatenate([places[:, :2], along], axis=1), triangles
+    fins = box((-0.05, -0.4, -1.7), (0.05, 0.4, -1.0)), box((-0.05, 0.2, -0.5), (0.05, 0.85, 0.3))
+    joints = joints_of(found(united(body, *fins)).figure.skeleton)
+    # The root is in the front third of the trunk, and the next joint in the middle.
+    assert 0.4 < joints["root"][2] < 1.2
+    assert abs(joints["limb_1"][2]) < 0.3
+    assert joints["limb_1_end"][2] < -1.3
+
+
+def test_limb_from_a_hub_begins_at_it_even_if_it_tapers():
+    # A spiral: a bone from the root to where the tail is thin would cross the turns.
+    angles = np.linspace(0.0, 3.5 * np.pi, 60)
+    radius = 0.3 + 0.12 * angles
+    spiral = pipe(np.stack([radius * np.cos(angles), 0 * angles, radius * np.sin(angles)], axis=1),
+                  0.12, end_radius=0.03)  # fmt: skip
+    skeleton = found(spiral).figure.skeleton
+    lengths = np.linalg.norm(np.array(skeleton.rest_translations)[1:], axis=1)
+    assert lengths.max() < 0.9
+
+
 def test_corners_of_a_cut_are_no_limbs():
     near = SimpleNamespace(
         _widths=np.array([0.1, 0.1]), _least=0.05, cuts=np.array([[1.0, 0, 0]]),
         _cut_widths=[0.2], _middles=np.array([[0.9, 0, 0], [3.0, 0, 0]]),
     )  # fmt: skip
     near._is_at_cut = lambda found: curve_skeleton._Field._is_at_cut(near, found)
-    assert not curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (0,), None))
+    assert not curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (0,), ()))
     # Neither is one that begins elsewhere, nor a longer one, a corner.
-    assert curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (1,), None))
-    assert curve_skeleton._Field._is_limb(near, Protrusion(1.5, 0.8, (0,), None))
+    assert curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (1,), ()))
+    assert curve_skeleton._Field._is_limb(near, Protrusion(1.5, 0.8, (0,), ()))
 
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
     field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
-    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.6, (0,))))
+    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ((0.6, (0,)),)))
     # The corner of a fan, as a bird's tail, is no limb.
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), (0.75, (0,))))
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), None))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ((0.75, (0,)),)))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ()))
+    # A leg that met a corner of its own foot first is one all the same.
+    met = (0.75, (0,)), (0.6, (0,))
+    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), met))
 
 
 def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):

@@ -84,11 +84,20 @@ _LONG = 3.0  # length of a limb relative to its neck, from which it is one where
 # ball are one.
 _REACH = 1.0
 _NARROWER = 0.8  # radius of a limb relative to that of the hub, below which it has its own joint
+# Distance from the hub, relative to its radius, at which the only limb begins at the latest.
+_TAPERED = 2.0
+# Distance of a path from the middle of a level set, relative to the half width, from which it is
+# beside it, as in a plate that a limb meets in its middle; and the least length and half width of
+# such a part at the end of a limb, relative to the half width of the limb, that is a plate.
+_BESIDE, _RIM = 0.5, 2.0
 # What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
 # to the solid's, and the ratio of the foot's radius to theirs.
 _FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
 # Radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake.
 _BODY = 2.0
+
+# Length of the part of a trunk beyond its middle, relative to its half width, if it is long.
+_SLENDER = 2.0
 
 # Joints along limbs.
 _TOLERANCE = 0.5  # of the polyline, relative to the half width
@@ -214,9 +223,9 @@ class _Field:
         """Paths to the tips of limbs, by the index of the tip."""
 
     def _is_limb(self, found: Protrusion) -> bool:
-        if found.neck is not None:
-            # On a plate, as a leg of a table, the base of a later junction is a part of the plate.
-            junction, base = found.neck
+        # On a plate, as a leg of a table, the base of a later junction is a part of the plate. The
+        # first junction may be with a bump of the limb itself, such as a corner of its foot.
+        for junction, base in found.necks:
             if found.tip - junction >= _LONG * float(self._widths[list(base)].max()):
                 return True
         width = float(self._widths[list(found.base)].max())
@@ -252,12 +261,25 @@ class _Field:
         found: Floats = self._widths[self._levels.labels[rows]]
         return found
 
+    def inner(self, rows: Ints) -> Ints:
+        """Return the voxels of the way to a tip without those to the rim of a plate at its end."""
+        middles = self._middles[self._levels.labels[rows]]
+        apart = np.linalg.norm(middles - self.centers[rows], axis=1)
+        rest = self.distances[rows[-1]] - self.distances[rows]
+        # The tip itself is a level set of its own.
+        widths = self.widths(rows)
+        is_inner = (apart <= _BESIDE * widths) & (rest >= self._least)
+        last = int(np.flatnonzero(is_inner)[-1]) if is_inner.any() else 0
+        usual, at_end = np.median(widths[: last + 1]), np.median(widths[last + 1 :])
+        is_plate = last > 0 and min(rest[last], at_end) >= _RIM * usual
+        return rows[: last + 1] if is_plate else rows
+
     def path(self, rows: Ints, ends: tuple[Floats, Floats | None], width: float) -> Floats:
         """Return a smooth path between ends along voxels (K,): (K, 3)."""
         middles = self._middles[self._levels.labels[rows]]
         points = self.centers[rows]
         # The middle of a level set may be beside the path, or in the hollow of a mug.
-        near = np.linalg.norm(middles - points, axis=1) <= 0.5 * self.widths(rows)
+        near = np.linalg.norm(middles - points, axis=1) <= _BESIDE * self.widths(rows)
         near &= self.solid.gaps(middles) <= NEAR * self.solid.spacing
         points = np.where(near[:, None], middles, points)
         points[0] = ends[0]
@@ -289,6 +311,8 @@ def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
                 continue  # another way to a hub
             if any(number in chain.tips and chain.end == end for chain in chains):
                 continue
+            if end < 0:
+                rows = field.inner(rows)
             beyond = frozenset({number, *(k for k in passed if end >= 0 and end in passed[k])})
             wide = float(paths.radii[hubs[start]])
             reached = _beginning(field, rows, field.parting(beyond), wide, end >= 0)
@@ -331,9 +355,11 @@ def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner:
         # It continues its hub, as a spine does; a limb as thick begins where it parts from others.
         return 0 if is_inner else reached
     if parting == 0.0:
-        # The only path of a base or a head: it begins where the radius has changed by half.
+        # The only path of a base or a head: it begins where the radius has changed by half, if it
+        # does so suddenly. A fish bends in front of that place, too.
         narrow = np.flatnonzero(field.radii[rows] <= np.sqrt(thick * wide))
-        reached = int(narrow[0])
+        far = np.flatnonzero(field.distances[rows] >= _TAPERED * wide)
+        reached = min(int(narrow[0]), int(far[0]) if len(far) else len(rows) - 1)
     return reached
 
 
@@ -437,7 +463,7 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     low, high = float(heights.min()), float(heights.max())
     inwards = [route[::-1] for route in tree.routes]
     if sum(chain.start == 0 for chain in tree.chains) == 1:
-        inwards.append(tree.rows[:1])
+        inwards.append(_blunt_end(solid, paths, tree))
     inside = [_inside_end(solid, paths, route) for route in inwards]
     wide = paths.radii[inside]
     relative = (heights[inside] - wide - low) / max(high - low, solid.spacing)
@@ -468,6 +494,27 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
         before = count - sum(beyond) if hub else 0
         most.append((max([before, *beyond]), -float(tree.radii[hub])))
     return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
+
+
+def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> Ints:
+    """Return the voxels of the way from the end opposite of the only limb to the first hub.
+
+    The head of a fish is no limb, as it is wider than long, but the end of a long trunk. That of a
+    bottle or of a mushroom is not longer than wide, and the way is the hub itself.
+    """
+    from scipy.sparse import csgraph
+
+    hub = int(tree.rows[0])
+    ways = csgraph.dijkstra(paths.steps, indices=[int(tree.routes[0][-1])], min_only=True)
+    end, beyond = int(ways.argmax()), ways >= ways[hub]
+    if end == hub:
+        return tree.rows[:1]
+    # As in ``LevelSets.half_widths``, but of the second largest extent: a plate has two.
+    extents = np.linalg.eigvalsh(np.cov(solid.centers(solid.voxels[beyond]).T))
+    if ways[end] - ways[hub] < _SLENDER * 2.0 * np.sqrt(extents[1]):
+        return tree.rows[:1]
+    (found,) = paths.to(np.array([hub]), np.array([end]))
+    return found
 
 
 def _middle_of_plate(solid: Solid, tree: Tree) -> int | None:

@@ -86,8 +86,8 @@ class Protrusion:
     """Distance at which it merges with others."""
     base: tuple[int, ...]
     """Its level sets just above the junction."""
-    neck: tuple[float, tuple[int, ...]] | None
-    """Junction and base where it stayed first; None if it has not yet."""
+    necks: tuple[tuple[float, tuple[int, ...]], ...]
+    """Junctions and bases where it stayed before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +139,7 @@ class LevelSets:
         group = list(range(self.count))
         kept = [[node] for node in range(self.count)]
         meetings: list[tuple[float, list[int]]] = []
-        necks: dict[int, tuple[float, tuple[int, ...]]] = {}
+        necks: dict[int, list[tuple[float, tuple[int, ...]]]] = {}
 
         def root(node: int) -> int:
             while group[node] != node:
@@ -162,12 +162,15 @@ class LevelSets:
                     if len(tips) > 1
                     and stays(
                         Protrusion(
-                            float(self._farthest[tip]), junction, base_of[tip], necks.get(tip)
+                            float(self._farthest[tip]),
+                            junction,
+                            base_of[tip],
+                            tuple(necks.get(tip, ())),
                         )
                     )
                 ]
                 for tip in passed:
-                    necks.setdefault(tip, (junction, base_of[tip]))
+                    necks.setdefault(tip, []).append((junction, base_of[tip]))
                 others = [tip for tip in passed if tip != tips[-1]]
                 kept[node] = others + tips[-1:]
                 if len({base_of[tip] for tip in kept[node]}) > 1:
