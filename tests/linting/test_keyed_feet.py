@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linting.sound import FRAMES, RATE, legs
+from rigs.retargeting.trotting import trot
 
 import viewer
 from viewer.linting import Finding, Subject, lint_scene
@@ -119,3 +120,22 @@ def test_notes_about_several_animations_are_one_line():
     assert found.motion == "walk, run, hop and 1 more"
     assert found.message.endswith("; first of 4")
     assert found.diagnostic.values["animations"] == list(names)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "codes"),
+    [
+        ((0.0, 0.0, 0.0), []),  # the paws of the trot stand exactly
+        ((0.3, 0.0, 0.0), ["C007.foot"]),  # slower than a paw swings: the animal is 0.45 m high
+        ((0.0, -0.1, 0.0), ["C008.throughout"]),  # 0.1 m below the ground from the first frame
+    ],
+)
+def test_feet_of_a_quadruped_are_checked(velocity, codes):
+    motion = trot()
+    clip, seconds = motion.clip, np.arange(motion.clip.n_rows) / motion.clip.timing.frame_rate
+    path = np.where(np.array(velocity) < 0.0, velocity, np.outer(seconds, velocity))
+    offsets = clip.translations.copy()
+    offsets[:, 0] += path
+    actor = Actor(motion.figure, clip=replace(clip, translations=offsets))
+    found = [*check_feet(Subject(actor, up=motion.figure.up))]
+    assert [one.diagnostic.key for one in found if one.severity == "warning"] == codes

@@ -24,8 +24,8 @@ from viewer.phrases import rounded
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.feet.body import body_size
 from viewer.rigs.feet.contacts import FootPath
-from viewer.rigs.feet.legs import legs_of
-from viewer.rigs.feet.soles import soles_of
+from viewer.rigs.feet.legs import animal_legs, legs_of
+from viewer.rigs.feet.soles import soles_of, soles_of_feet
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import align_signs, multiply
 from viewer.rigs.geometry.transform import apply_transform, mean_scale
@@ -55,6 +55,7 @@ _FAR = 10.0  # strays are ignored if they enlarge the bounding box by more than 
 _PROP = 0.1  # relative size of a skeleton below which its mesh determines the size
 _MOST_JOINTS = 0.5  # minimum fraction of the joints that are below one that carries the body
 _STAYS = 1e-3  # relative distance up to which a translation is rounding
+_QUADRUPED = 4  # number of legs
 # Frames
 _TOGETHER = 1000  # frames per batch, which limits the memory for their matrices
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
@@ -218,7 +219,7 @@ class Track:
     """Scene units per figure unit."""
     feet: Ints
     """(N,): the joint of each foot nearest to the ground; empty unless joint names identify two
-    feet."""
+    feet, or the skeleton has the shape of a quadruped's."""
     soles: Floats
     """(F, N): height of each foot's lowest point in the scene."""
     paths: tuple[FootPath, ...]
@@ -298,7 +299,14 @@ def _track(subject: Subject) -> Track | None:
     scale = mean_scale(actor.placement)
     is_bound = figure.is_attached and not subject.lacks("bindings")
     stance = _stance(figure, clip)
-    soles = soles_of(shaped(stance, frames.shape_weights[0]), is_bound) if count else None
+    legs = animal_legs(skeleton.parents, rest_joints(stance), axis_vector(figure.up))
+    # The tips of insects' legs are drawn in the ground.
+    legs = legs if len(legs) == _QUADRUPED else []
+    soles = None
+    if count:
+        stands = shaped(stance, frames.shape_weights[0])
+        paws = [[leg.toe] for leg in legs]
+        soles = soles_of_feet(stands, paws, is_bound) if legs else soles_of(stands, is_bound)
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
     heels = np.empty((count, len(feet), 3))
@@ -310,7 +318,7 @@ def _track(subject: Subject) -> Track | None:
             lowest[part] = soles.scene_heights(world, actor.placement, subject.up)
             heels[part] = np.einsum("fnab,nb->fna", world[:, soles.ankles, :3], soles.heels)
     placed = apply_transform(actor.placement, joints)
-    hips = {leg.ankle: leg.hip for leg in legs_of(skeleton)}
+    hips = {leg.toe if legs else leg.ankle: leg.hip for leg in legs or legs_of(skeleton)}
     paths = []
     for number, foot in enumerate(feet.tolist()):
         heel = apply_transform(actor.placement, heels[:, number])

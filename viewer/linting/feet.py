@@ -54,7 +54,7 @@ _CARRIED = 0.2  # minimum length of this path, as a fraction of the figure's hei
 
 
 def check(subject: Subject) -> Iterator[Finding]:
-    """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
+    """Check the feet of a moving body: of two named ankles, or of a quadruped's legs."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
     if track is None or figure.skeleton is None or subject.options.ground == "none":
@@ -81,7 +81,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     yield from _sunk(
         subject, track, feet, labels, heights - ground, sinks * height, height, is_recorded
     )
-    yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
+    if len(feet) == 2:  # animals also lie on the ground
+        yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
     yield from _slipped(subject, track, feet, labels, heights - ground, height, is_recorded)
 
 
