@@ -35,6 +35,7 @@ from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import axis_rotations as about_axis
+from viewer.rigs.geometry.rotation import rotation_distance
 from viewer.rigs.geometry.transform import affine_matrices, apply_transform
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.memo import Memo
@@ -317,8 +318,8 @@ def _placed_line(found: Similarity, inside: int, count: int, before: int | None)
         return note(
             "R001.skeleton: skeleton: used where it is, {inside} of {all} inside the mesh", **values
         )
-    angle = np.degrees(np.arccos(np.clip(0.5 * (np.trace(found.rotation) - 1.0), -1.0, 1.0)))
-    moved = {"scale": rounded(found.scale, 6), "angle": float(angle), **values}
+    angle = float(np.degrees(rotation_distance(found.rotation, np.eye(3))))
+    moved = {"scale": rounded(found.scale, 6), "angle": angle, **values}
     # A fit leaves rounding errors where nothing moves.
     shift = np.where(np.abs(found.shift) > _ROUNDING * np.abs(found.shift).max(), found.shift, 0.0)
     moved |= dict(zip("xyz", shift.tolist(), strict=True))

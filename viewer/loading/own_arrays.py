@@ -18,7 +18,7 @@ from viewer.phrases import all_of
 from viewer.rigs.arrays import Bools, Bytes, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
-from viewer.rigs.geometry.rotation import are_rotations, matrix_to_quaternion
+from viewer.rigs.geometry.rotation import are_rotations, matrix_to_quaternion, six_to_matrix
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.material import Material, Texture
@@ -361,9 +361,9 @@ def _quaternions(rotations: ArrayLike, n_joints: int, representation: Rotations 
     if kind == "rotation_vector":
         return rotation_vector_to_quaternion(values)
     if kind == "6d":
-        areas = np.linalg.norm(np.cross(values[..., :3], values[..., 3:]), axis=-1)
-        _check_rotations(areas > 0.0, "two columns of a matrix, found parallel ones or zeros")
-        return matrix_to_quaternion(_from_columns(values))
+        matrices, lengths = six_to_matrix(values)
+        _check_rotations(lengths > 0.0, "two columns of a matrix, found parallel ones or zeros")
+        return matrix_to_quaternion(matrices)
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
     _check_rotations(lengths[..., 0] > 0.0, "a quaternion, found zeros")
     return values / lengths
@@ -374,16 +374,3 @@ def _check_rotations(is_valid: Bools, expected: str) -> None:
     if not is_valid.all():
         frame, joint = np.argwhere(~is_valid)[0].tolist()
         raise RigError(f"rotations[{frame}, {joint}]: expected {expected}")
-
-
-def _from_columns(values: Floats) -> Floats:
-    """Return matrices (..., 3, 3) of two columns each (..., 6), by Gram-Schmidt.
-
-    Zhou, Barnes, Lu, Yang, Li 2019, "On the Continuity of Rotation Representations in Neural
-    Networks", eq. 15: the six numbers are the first column, then the second one.
-    """
-    first, second = values[..., :3], values[..., 3:]
-    x = first / np.linalg.norm(first, axis=-1, keepdims=True)
-    across = second - (x * second).sum(axis=-1, keepdims=True) * x
-    y = across / np.linalg.norm(across, axis=-1, keepdims=True)
-    return np.stack([x, y, np.cross(x, y)], axis=-1)

@@ -10,9 +10,8 @@ from rigs.hand_made import skeleton
 from viewer.errors import RigError
 from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.comparison import compare, content_notes
-from viewer.rigs.comparison.pairs import rotation_distance
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.rotation import axis_rotations
+from viewer.rigs.geometry.rotation import axis_rotations, rotation_distance
 from viewer.rigs.material import Material, Outline, Rim
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.motion.sampled_clip import SampledClip

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Floats, freeze_fields
-from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.rotation import nearest_similarity
 
 # Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.
@@ -76,10 +76,7 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
         extents = np.linalg.svd(cloud, compute_uv=False)
         if extents[1] <= _ON_LINE * extents[0]:
             raise RigError("alignment: expected points in a plane or in space, found a line")
-    # With means removed, sum_i q_i p_i^T = U D V^T = R P, R = U S V^T, S = diag(1, 1, det(U V^T)),
-    # s = tr(D S) / sum |p_i|^2 with tr(D S) = tr P, t = mean q - s R mean p (Umeyama 1991, eqs. 39
-    # to 43).
-    rotation, stretch = nearest_rotations(q.T @ p)
-    found = float(np.trace(stretch) / np.einsum("na,na->", p, p)) if scale is None else scale
-    shift = to_mean - found * rotation @ from_mean
+    found, rotation, shift = nearest_similarity(points, targets)
+    if scale is not None:
+        found, shift = scale, to_mean - scale * rotation @ from_mean
     return Similarity(found, rotation, shift, np.ones(3))

@@ -32,6 +32,7 @@ from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints, freeze_fields
+from viewer.rigs.geometry.rotation import rotation_distance
 from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import Up
 
@@ -302,7 +303,7 @@ _HOW: dict[AlignedBy, str] = {
 def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
     """Return messages about scale, rotation, shift and error, and about doubtful results."""
     similarity = alignment.similarity
-    angle = np.degrees(np.arccos(np.clip((np.trace(similarity.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    angle = float(np.degrees(rotation_distance(similarity.rotation, np.eye(3))))
     how = Phrase(_HOW[alignment.how])
     if alignment.how == "in place" and similarity.scale == 1.0 and angle == 0.0:
         how = Phrase("the target already coincides with the template")

@@ -24,7 +24,11 @@ from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._source import Source
 from viewer.phrases import counted, rounded
 from viewer.rigs.arrays import Bools, Floats, Ints
-from viewer.rigs.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
+from viewer.rigs.geometry.rotation import (
+    matrix_to_rotation_vector,
+    nearest_rotations,
+    six_to_matrix,
+)
 
 Frames = NDArray[np.int64]
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
@@ -212,17 +216,9 @@ def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
 
 def six(archive: Archive, key: str, found: Floats) -> Floats:
     """Return rotation vectors of 6D rotations (..., 6): two columns (Zhou et al. 2019)."""
-    # Gram-Schmidt: the second column loses its part along the first one; the third one follows.
-    first, second = found[..., :3], found[..., 3:]
-    x = _unit(archive, key, first)
-    y = _unit(archive, key, second - (x * second).sum(axis=-1, keepdims=True) * x)
-    return matrix_to_rotation_vector(np.stack([x, y, np.cross(x, y)], axis=-1))
-
-
-def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    is_short = lengths < _SMALLEST
-    if is_short.any():
-        worst = float(lengths[is_short].min())
+    matrices, lengths = six_to_matrix(found)
+    is_flat = lengths < _SMALLEST
+    if is_flat.any():
+        worst = float(lengths[is_flat].min())
         archive.leave_gap(wording.VIDEO_ROTATION, item=key, found=rounded(worst))
-    return np.where(is_short, np.nan, vectors / np.where(is_short, 1.0, lengths))
+    return matrix_to_rotation_vector(np.where(is_flat[..., None, None], np.nan, matrices))

@@ -17,14 +17,13 @@ from viewer.rigs.comparison.pairs import (
     Pairs,
     pair_joints,
     pair_names,
-    rotation_distance,
     row_distances,
     skin_at,
 )
 from viewer.rigs.comparison.steps import FrameRange, Steps, steps_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.closest_point import Surface, SurfacePoints
-from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.rotation import nearest_rotations, rotation_distance
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.material import Material, Outline, Rim, Texture
 from viewer.rigs.mesh import bounding_box, box_size

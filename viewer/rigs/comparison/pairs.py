@@ -117,17 +117,6 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))
 
 
-def rotation_distance(first: Floats, second: Floats) -> Floats:
-    """Return the angle (...) in radians between rotations, 2 asin(|A - B| / sqrt(8)) (Frobenius).
-
-    It stays accurate for small angles, unlike the arc cosine of the trace.
-    """
-    # |A - B|^2 = tr A^T A + tr B^T B - 2 tr A^T B = 6 - 2 (1 + 2 cos t) = 8 sin^2(t / 2), where t
-    # is the angle of A^T B, whose trace is 1 + 2 cos t.
-    norm = np.linalg.norm(first - second, axis=(-2, -1))
-    return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))
-
-
 def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     """Return each vertex's sum over joints of |w - w'| (V,): 2 if no joint has weight in both."""
     # The difference of two rows is one row with the weights of both, the second ones negative: its

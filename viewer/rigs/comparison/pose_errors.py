@@ -24,7 +24,7 @@ from viewer.rigs.arrays import Bools, Floats, runs_of
 from viewer.rigs.feet.body import body_legs
 from viewer.rigs.feet.contacts import foot_contacts
 from viewer.rigs.feet.legs import legs_of
-from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.rotation import nearest_similarity
 from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.motion.sampled_animation import clip_of, sample_animation
 from viewer.rigs.scene import Actor
@@ -162,15 +162,8 @@ def _millimetres(actor: Actor) -> float:
 
 def _fitted(points: Floats, wanted: Floats) -> Floats:
     """Return points (J, 3) after the similarity that is nearest to others (Umeyama 1991)."""
-    middle, aim = points.mean(axis=0), wanted.mean(axis=0)
-    a, b = points - middle, wanted - aim
-    # With U D V^T = sum b a^T: R = U S V^T, where S = diag(1, 1, det) prevents a reflection
-    # (eq. 40), and the scale is tr(D S) / sum |a|^2 (eq. 42). Both are of the polar decomposition
-    # R P of the sum, as P = V S D V^T.
-    rotation, stretch = nearest_rotations(b.T @ a)
-    total = float((a * a).sum())
-    scale = float(np.trace(stretch)) / total if total > 0.0 else 1.0
-    placed: Floats = scale * a @ rotation.T + aim
+    scale, rotation, shift = nearest_similarity(points, wanted)
+    placed: Floats = scale * points @ rotation.T + shift
     return placed
 
 

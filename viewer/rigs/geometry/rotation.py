@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.geometry.quaternion import quaternion_to_rotation_vector
+from viewer.rigs.geometry.vectors import unit
 
 TURN = 2.0 * np.pi
 """Radians in a revolution."""
@@ -139,6 +140,50 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
     rotations = (left * signs[..., None, :]) @ right
     return rotations, np.swapaxes(rotations, -1, -2) @ matrices
+
+
+def nearest_similarity(points: Floats, targets: Floats) -> tuple[float, Floats, Floats]:
+    """Return s, R (3, 3) and t (3,) that bring s R p + t nearest to targets, both (N, 3).
+
+    The scale is 1 if all points coincide.
+    """
+    # With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T, where S = diag(1, 1, det(U V^T))
+    # prevents a reflection, s = tr(D S) / sum |p_i|^2 and t = mean q - s R mean p (Umeyama 1991,
+    # eqs. 39 to 43). Both are of the polar decomposition R P of the sum, as P = V S D V^T.
+    middle, aim = points.mean(axis=0), targets.mean(axis=0)
+    p, q = points - middle, targets - aim
+    rotation, stretch = nearest_rotations(q.T @ p)
+    total = float(np.einsum("na,na->", p, p))
+    scale = float(np.trace(stretch)) / total if total > 0.0 else 1.0
+    return scale, rotation, aim - scale * rotation @ middle
+
+
+def rotation_distance(first: Floats, second: Floats) -> Floats:
+    """Return the angle (...) in radians between rotations, 2 asin(|A - B| / sqrt(8)) (Frobenius).
+
+    It stays accurate for small angles, unlike the arc cosine of the trace.
+    """
+    # |A - B|^2 = tr A^T A + tr B^T B - 2 tr A^T B = 6 - 2 (1 + 2 cos t) = 8 sin^2(t / 2), where t
+    # is the angle of A^T B, whose trace is 1 + 2 cos t.
+    norm = np.linalg.norm(first - second, axis=(-2, -1))
+    return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))
+
+
+def six_to_matrix(values: Floats) -> tuple[Floats, Floats]:
+    """Return matrices (..., 3, 3) of two columns each (..., 6), and how far these span a plane.
+
+    Zhou, Barnes, Lu, Yang, Li 2019, "On the Continuity of Rotation Representations in Neural
+    Networks", eq. 15: the six numbers are the first column, then the second one. Matrices are valid
+    where the second result (...) is above 0: the shorter of the two columns, of the second its part
+    across the first.
+    """
+    # Gram-Schmidt: the second column loses its part along the first one; the third one follows.
+    first, second = values[..., :3], values[..., 3:]
+    x = unit(first)
+    across = second - (x * second).sum(axis=-1, keepdims=True) * x
+    y = unit(across)
+    lengths = np.linalg.norm(np.stack([first, across]), axis=-1)
+    return np.stack([x, y, np.cross(x, y)], axis=-1), lengths.min(axis=0)
 
 
 def are_rotations(matrices: Floats, tolerance: float) -> Bools:
