@@ -21,10 +21,12 @@ from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
+    rotation_distance,
     rotation_vector_to_matrix,
 )
 from viewer.rigs.geometry.vectors import Up, axes_along, axis_vector, unit
 from viewer.rigs.hierarchy import path_to_root, with_ancestors
+from viewer.rigs.kinematics import joint_worlds
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.retargeting.rest_alignment import shortest_arc
@@ -92,14 +94,18 @@ class Postures:
         """Return horizontal unit vectors to the front of the body: (F, 3)."""
         return np.cross(self.left(), self.up)
 
+    @property
+    def stands(self) -> Floats:
+        """Left, up and forward of the standing body as columns: (3, 3)."""
+        left = np.array([1.0, 0.0, 0.0])
+        return np.stack([left, self.up, np.cross(left, self.up)], axis=1)
+
     def righted(self) -> Postures:
         """Return the poses rotated as a whole, with the trunk along ``up`` and the left along x."""
         trunk, side = self.trunk(), self.direction("right_hip", "left_hip")
         ahead = unit(np.cross(side, trunk))
         own = np.stack([np.cross(trunk, ahead), trunk, ahead], axis=2)
-        left = np.array([1.0, 0.0, 0.0])
-        stands = np.stack([left, self.up, np.cross(left, self.up)], axis=1)
-        turns = stands @ np.swapaxes(own, 1, 2)
+        turns = self.stands @ np.swapaxes(own, 1, 2)
         return replace(
             self,
             rotations=turns[:, None] @ self.rotations,
@@ -140,13 +146,10 @@ def _postures(skeleton: Skeleton, up: Up, rows: Ints, local: Floats) -> Postures
     needed = {f"{side}_{part}" for side in SIDES for part in _NEEDED}
     if not needed <= set(joints) or not {"neck", "head"} & set(joints):
         return None
-    rotations = quaternion_to_matrix(local)
-    points = np.zeros((len(rows), skeleton.n_joints, 3))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            above, offset = rotations[:, parent], skeleton.rest_translations[joint]
-            points[:, joint] = points[:, parent] + above @ offset
-            rotations[:, joint] = above @ rotations[:, joint]
+    # Positions are relative to the root.
+    offsets = np.where(skeleton.parents[:, None] < 0, 0.0, skeleton.rest_translations)
+    worlds = joint_worlds(skeleton.parents, quaternion_to_matrix(local), offsets)
+    rotations, points = worlds[..., :3, :3].copy(), worlds[..., :3, 3].copy()
     found = Postures(rows, rotations, points, joints, axis_vector(up))
     is_over = float(np.median(found.trunk() @ found.up)) < 0.0
     return replace(found, up=-found.up) if is_over else found
@@ -186,8 +189,7 @@ def anatomical_rest(
     # Left, up and forward as columns: of the body in each frame, and of the standing body.
     up = np.broadcast_to(postures.up, (len(postures.rows), 3))
     body = np.stack([postures.left(), up, postures.forward()], axis=2)
-    left = np.array([1.0, 0.0, 0.0])
-    stands = np.stack([left, postures.up, np.cross(left, postures.up)], axis=1)
+    stands = postures.stands
     limbs = limb_axes(postures)
     fixed = _trunk(postures, skeleton, body, stands)
     for limb in limbs:
@@ -404,6 +406,7 @@ def _parallel_rest(
     inner = _above(parents, names)
     feet = _feet(estimate, postures, skeleton, stands)
     is_like_forearm = _angle_of_wrists(estimate, postures, parents) < _SAME_AXES
+    turned = rotation_distance(estimate[parents], estimate)
     result = np.empty_like(estimate)
     for joint, parent in enumerate(parents):
         name, local = names.get(joint, ""), estimate[parent].T @ estimate[joint]
@@ -413,7 +416,7 @@ def _parallel_rest(
             result[joint] = stands @ _nearest(stands.T @ estimate[joint])
         elif not inner[joint]:
             result[joint] = result[parent] @ local
-        elif is_like_forearm if name.endswith("wrist") else _angle(local) < _SAME_AXES:
+        elif is_like_forearm if name.endswith("wrist") else turned[joint] < _SAME_AXES:
             result[joint] = result[parent]
         else:
             result[joint] = result[parent] @ _nearest(local)
@@ -437,7 +440,8 @@ def _is_finger(name: str) -> bool:
 def _angle_of_wrists(estimate: Floats, postures: Postures, parents: Ints) -> float:
     """Return the smaller angle between a hand's and its parent's axes: forearms may be twisted."""
     wrists = [postures.joints[f"{side}_wrist"] for side in SIDES]
-    return min(_angle(estimate[parents[wrist]].T @ estimate[wrist]) for wrist in wrists)
+    above = estimate[[parents[wrist] for wrist in wrists]]
+    return float(rotation_distance(above, estimate[wrists]).min())
 
 
 def _feet(
@@ -470,7 +474,7 @@ def _stated_slope(
         return 0.0
     local = axes @ postures.rotations[:, toes]
     mean = nearest_rotations(local.mean(axis=0))[0]
-    if max(_angle(mean.T @ each) for each in local) > _STIFF:
+    if rotation_distance(local, mean).max() > _STIFF:
         return None
     # Toes that do not move are level.
     return _pitch(level[1] @ mean.T @ level[0].T, stands)
@@ -483,10 +487,6 @@ def _pitch(rotation: Floats, stands: Floats) -> float:
     # ratio.
     own = stands.T @ rotation @ stands
     return float(np.arctan2(own[2, 1] - own[1, 2], own[1, 1] + own[2, 2]))
-
-
-def _angle(rotation: Floats) -> float:
-    return float(np.arccos(np.clip((np.trace(rotation) - 1.0) / 2.0, -1.0, 1.0)))
 
 
 def _all_axes() -> Floats:

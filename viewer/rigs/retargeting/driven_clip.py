@@ -10,7 +10,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply
-from viewer.rigs.geometry.rotation import quaternion_to_matrix, up_rotation
+from viewer.rigs.geometry.rotation import matrix_to_quaternion, up_rotation
 from viewer.rigs.geometry.vectors import Up, axes_along, axis_vector
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.retargeting.drive import Drive
@@ -26,7 +26,6 @@ from viewer.rigs.retargeting.source_rest import with_source_rest, with_upright_r
 # Pairs of joints that show the left side of a body, the most certain first.
 _SIDES = ("hip", "shoulder", "knee", "collar", "elbow")
 _SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of the skeleton's size
-_Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
@@ -48,8 +47,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     if not drive.keeps_up or up == figure.up:
         return clip, notes
     # The retargeted figure is upright along its own up axis; rotate it to the world's up axis.
-    rotation = _Z_TO_Y if figure.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
-    return _rotated(clip, figure, rotation), notes
+    return _rotated(clip, figure, up_rotation(figure.up, up)), notes
 
 
 def matches_of(drive: Drive, figure: Figure) -> Matches:
@@ -91,12 +89,12 @@ def front_axes(points: Floats, matches: Matches, up: Up, is_source: bool) -> Flo
     return axes_along(upward, np.eye(3)[0]).T
 
 
-def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip:
+def _rotated(clip: SampledClip, figure: Figure, matrix: Floats) -> SampledClip:
     """Return a motion rotated about the origin: R' = Q R and T' = Q (rest + T) - rest at roots."""
     skeleton = figure.require_skeleton()
-    matrix, rotations = quaternion_to_matrix(rotation), clip.rotations.copy()
+    rotations = clip.rotations.copy()
     roots = np.flatnonzero(skeleton.parents < 0)
-    rotations[:, roots] = multiply(rotation, rotations[:, roots])
+    rotations[:, roots] = multiply(matrix_to_quaternion(matrix), rotations[:, roots])
     rests = skeleton.rest_translations[roots]
     shifts = np.zeros_like(clip.rotations[..., :3]) if clip.translations is None else (
         clip.translations.copy()
