@@ -309,6 +309,30 @@ def test_feet_of_a_lying_person_are_not_planted():
     assert clip is found.clip and changes.n_contacts == 0
 
 
+def test_feet_that_never_stand_are_as_low_as_those_of_the_source():
+    """Runs of games touch the ground for a frame: figures with other ankles floated or sank."""
+    rotations, path = walk()
+    path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s
+    motion = written(t_pose(), rotations, path, rate=RATE)
+    # Without toes and a mesh, the ankles of the figure are its soles; they used to be as high as
+    # those of the source. The soles of the source are level, so its balls are its lowest points.
+    joints = {n: place for n, place in PERSON.items() if not n.endswith("ToeBase")}
+    for side in SIDES:  # other proportions
+        parent, place = joints[f"{side}Leg"]
+        joints[f"{side}Leg"] = parent, np.add(place, [0.0, 3.0, 0.0])
+    names = {name: f"{name}_" for name in joints}
+    figure = figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in joints.items()}, "other")
+    found = retarget(motion, figure)
+    clip, changes = plant_feet(found, figure)
+    own, theirs = places(figure, clip), places(motion.figure, motion.clip)
+    ankles = np.minimum(*(own[f"{side}Foot_"][:, 1] for side in SIDES))
+    balls = np.minimum(*(theirs[f"{side}ToeBase"][:, 1] for side in SIDES))
+    assert changes.n_contacts == 0 and changes.raised < -5.0
+    assert_allclose(
+        np.percentile(ankles, 2.0), found.scale * np.percentile(balls, 2.0), rtol=0, atol=EXACT
+    )
+
+
 def test_contacts_can_begin_and_end_gradually():
     # The foot moves quickly, rests at 20 for 40 frames, and moves on.
     place = np.concatenate([np.arange(20.0), np.full(40, 20.0), np.arange(21.0, 41.0)])

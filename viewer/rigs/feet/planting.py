@@ -135,6 +135,9 @@ _FLIGHT = 0.05
 # first.
 _STRAIGHT = (0.8, 0.95)
 
+# Percentage of the rows in which the feet of a motion without contacts are lowest.
+_LOWEST_ROWS = 2.0
+
 STEPS = 2 + 3 * (1 + len(_EASES))
 """Maximum number of steps reported as progress; the first one is the caller's."""
 
@@ -162,6 +165,8 @@ class PlantedFeet:
     n_glides: int = 0
     """Number of contacts in which a foot is not held because it glides too far, as on skates or
     where the whole body drifts."""
+    raised: float = 0.0
+    """Height by which the whole motion was raised because its feet never stand."""
 
     @property
     def is_better(self) -> bool:
@@ -212,7 +217,11 @@ def plant(
 
     plan = plan_of(0.0)
     if not any(plan.contacts):
-        return clip, PlantedFeet(n_glides=plan.n_glides)
+        raised = 0.0 if is_own else _below_source(feet, body, worlds, up)
+        roots = body.chains.joints[body.chains.parents < 0]
+        lift = np.tile(raised * up, (clip.n_rows, 1))
+        moved = _translated(clip, lift, roots) if raised else clip
+        return moved, PlantedFeet(n_glides=plan.n_glides, raised=raised, size=body.size)
     best = _attempt(clip, body, worlds, plan, speed, 2)
     for number, ease in enumerate(_EASES, 1):
         # The knees of a noisy capture move suddenly before anything is changed.
@@ -222,6 +231,19 @@ def plant(
         if tried.knees < best.knees and tried.changes.after <= tried.changes.source:
             best = tried
     return (best.clip if best.changes.is_better else clip), best.changes
+
+
+def _below_source(feet: Sequence[FootPath], body: BodyLegs, worlds: Floats, up: Floats) -> float:
+    """Return how far the lowest soles are below those of the source; 0 unless the source stands."""
+    # Heights of hips follow those of the source, scaled by the length of the legs, so that the feet
+    # of a figure with low ankles float where those of the source only touch the ground for a frame,
+    # as in a run of a game.
+    legs = np.concatenate([foot.hip - foot.heel for foot in feet])
+    if np.median(legs @ up - limits.UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+        return 0.0
+    lows = np.min([foot.lowest(up) for foot in feet], axis=0), body.heights(worlds, up).min(axis=1)
+    theirs, own = (float(np.percentile(each, _LOWEST_ROWS)) for each in lows)
+    return theirs - own if abs(theirs - own) > limits.LEVEL * body.size else 0.0
 
 
 def _attempt(

@@ -54,7 +54,7 @@ def plant_feet(
     own = body.feet_from_ankles(worlds)
     feet = _source_paths(found, source, pairs, own, rest_up, body.size)
     planted, changes = plant(clip, body, worlds, up, feet)
-    return (planted if changes.is_better else found.clip), changes
+    return (planted if changes.is_better or changes.raised else found.clip), changes
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,12 +165,24 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
             else "F007.feet-no-contacts: feet of {figure} not planted: no ground contacts found in "
             "{motion}"
         )
-        return [note(key, **called)]
+        notes = [note(key, **called)]
+        if changes.raised:
+            notes.append(
+                note(
+                    "F007.feet-level: {figure} is {moved} by {length}, so that its feet are as low "
+                    "as those of {motion}; {remedy} disables this",
+                    **called,
+                    moved="raised" if changes.raised > 0.0 else "lowered",
+                    length=length_text(figure, abs(changes.raised)),
+                    remedy=Remedy("Feet on the ground in the Actors panel", "--feet off"),
+                )
+            )
+        return notes
 
     def text(length: float) -> str:
         return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
 
-    notes: list[Diagnostic] = []
+    notes = []
 
     def add(key: str, **values: object) -> None:
         notes.append(note(key, **values))
