@@ -296,7 +296,7 @@ from viewer.errors import OutputError
 from viewer.media.video import VideoSink
 
 def write(path):
-    sink = VideoSink(path, (320, 240), 25.0)
+    sink = VideoSink(path, (192, 144), 25.0)
     try:
         for frame in range(20):
             sink.write(frame, np.roll(noise, frame, axis=1))
@@ -306,7 +306,7 @@ def write(path):
         print(problem)
     return sink.n_bytes
 
-noise = np.random.default_rng(0).integers(0, 255, (240, 320, 4), dtype=np.uint8)
+noise = np.random.default_rng(0).integers(0, 255, (144, 192, 4), dtype=np.uint8)
 noise[..., 3] = 255
 path = Path(sys.argv[1])
 size = write(path)
