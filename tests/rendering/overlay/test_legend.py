@@ -77,13 +77,13 @@ def test_ticks_of_differences_have_signs():
     assert texts == ["-50", "0", "+50"]
 
 
-@pytest.mark.parametrize("power", range(-12, 13))
 @pytest.mark.parametrize("share", [1.0, 1.3, 2.0, 3.7, 4.999, 5.0, 7.77, 9.99])
-def test_every_range_has_two_to_six_ticks(power, share):
-    ticks = round_ticks(0.0, share * 10.0**power)
-    assert 2 <= len(ticks) <= 6
-    places = [tick.place for tick in ticks]
-    assert places == sorted(places) and len({tick.text for tick in ticks}) == len(ticks)
+def test_every_range_has_two_to_six_ticks(share):
+    for power in range(-12, 13):
+        ticks = round_ticks(0.0, share * 10.0**power)
+        assert 2 <= len(ticks) <= 6, power
+        places = [tick.place for tick in ticks]
+        assert places == sorted(places) and len({tick.text for tick in ticks}) == len(ticks), power
 
 
 def test_lengths_are_in_millimetres():
