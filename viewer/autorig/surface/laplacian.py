@@ -110,3 +110,15 @@ def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> csr_array:
     )
     diagonal = np.asarray(-matrix.sum(axis=1)).ravel()
     return sparse.csr_array(matrix + sparse.diags_array(diagonal, shape=shape))
+
+
+def neighbour_means(links: Ints, count: int) -> csr_array:
+    """Return the matrix (V, V) that takes the mean of each vertex's neighbours, by edges (E, 2).
+
+    Rows of vertices without neighbours are empty.
+    """
+    from scipy import sparse
+
+    rows, columns = np.concatenate([links, links[:, ::-1]]).T
+    degrees = np.bincount(rows, minlength=count)
+    return sparse.csr_array((1.0 / degrees[rows], (rows, columns)), shape=(count, count))

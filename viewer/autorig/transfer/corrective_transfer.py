@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.autorig.surface.laplacian import neighbour_means
 from viewer.autorig.surface.welding import edges, weld
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.blendshapes import Correctives
@@ -49,11 +50,8 @@ def _fade(matched: Bools, positions: Floats, triangles: Ints) -> Floats:
     count = len(welded.positions)
     fraction = np.zeros(count)
     fraction[welded.vertices] = matched
-    links = edges(welded.triangles)
-    degree = np.bincount(links.ravel(), minlength=count)
+    means = neighbour_means(edges(welded.triangles), count)
+    is_alone = np.diff(means.indptr) == 0
     for _ in range(_ROUNDS):
-        sums = np.bincount(links[:, 0], fraction[links[:, 1]], minlength=count)
-        sums += np.bincount(links[:, 1], fraction[links[:, 0]], minlength=count)
-        mean = np.where(degree > 0, sums / np.maximum(degree, 1), fraction)
-        fraction = 0.5 * (fraction + mean)
+        fraction = 0.5 * (fraction + np.where(is_alone, fraction, means @ fraction))
     return np.asarray(fraction[welded.vertices], dtype=np.float64)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.autorig.surface.laplacian import neighbour_means
 from viewer.autorig.surface.welding import edges, weld
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
@@ -112,11 +113,8 @@ def _laplacian(count: int, links: Ints) -> csr_array:
     """Return the graph Laplacian: each vertex minus the mean of its neighbours."""
     from scipy import sparse
 
-    a, b = links[:, 0], links[:, 1]
-    degree = np.maximum(np.bincount(links.ravel(), minlength=count), 1)
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    matrix = sparse.csr_array((-1.0 / degree[rows], (rows, columns)), shape=(count, count))
-    return matrix + sparse.diags_array((np.bincount(links.ravel(), minlength=count) > 0) * 1.0)
+    means = neighbour_means(links, count)
+    return sparse.csr_array(sparse.diags_array(1.0 * (np.diff(means.indptr) > 0)) - means)
 
 
 def _normal_equations(

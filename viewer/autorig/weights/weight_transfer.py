@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.autorig.correspondence import MatchSettings, Template, match, wound_backwards
-from viewer.autorig.surface.laplacian import laplacian
+from viewer.autorig.surface.laplacian import laplacian, neighbour_means
 from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.autorig.weights.result import (
     RigidIslands,
@@ -344,16 +344,12 @@ def smooth(weights: csr_array, triangles: Ints, active: Bools, rounds: int = _RO
     """Blend active rows with their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours)."""
     from scipy import sparse
 
-    links = edges(triangles)
-    both = np.concatenate([links, links[:, ::-1]])
-    both = both[active[both[:, 0]]]
-    count = weights.shape[0]
-    degrees = np.bincount(both[:, 0], minlength=count)
-    mixed = degrees > 0  # the weights of vertices without neighbours are unchanged
-    mean = sparse.csr_array(
-        (_FRACTION / degrees[both[:, 0]], (both[:, 0], both[:, 1])), shape=(count, count)
+    means = neighbour_means(edges(triangles), weights.shape[0])
+    mixed = active & (np.diff(means.indptr) > 0)  # weights of vertices without neighbours stay
+    fractions = np.where(mixed, _FRACTION, 0.0)
+    step = sparse.csr_array(
+        sparse.diags_array(fractions) @ means + sparse.diags_array(1.0 - fractions)
     )
-    step = sparse.csr_array(mean + sparse.diags_array(np.where(mixed, 1.0 - _FRACTION, 1.0)))
     result = weights
     for _ in range(rounds):
         result = step @ result
