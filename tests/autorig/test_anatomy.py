@@ -178,6 +178,17 @@ def test_corners_of_a_cape_are_no_legs(standing):
     assert found.lower is plan.lower
 
 
+def test_legs_may_be_less_than_half_as_long_as_arms_that_reach_the_ground(standing):
+    (plan,) = plans_of(standing, False, AHEAD)
+    points = np.array([[1.2, 0.05, 0], [0.2, 1.0, 0], [0.0, 1.0, 0]])
+    arms = LimbPair(
+        tuple(Limb(points * [s, 1, 1], np.full(3, 0.05), points[2], 1.6) for s in (1, -1))
+    )
+    assert standing.stands(arms) and arms.length > 2.0 * plan.lower.length
+    (found,) = plans_of(replace(standing, pairs=(arms, plan.lower)), False, AHEAD)
+    assert found.lower is plan.lower and found.upper is arms
+
+
 def test_longer_path_of_an_arm_that_touches_the_body_is_not_cut(standing):
     (plan,) = plans_of(standing, False, AHEAD)
     one, other = plan.upper.limbs

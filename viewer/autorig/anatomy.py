@@ -66,6 +66,9 @@ _ON_GROUND = 0.12  # height of the tip of a leg, as a fraction of the figure's h
 
 _ARM = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)  # fractions of the path from tip to junction
 _LEG = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # fractions of the height of the attachment
+# Rise of a leg over its length, with a foot: legs of characters have 0.4 to 0.85, what lies on the
+# ground has 0.
+_UPWARDS = 0.2
 _AS_LONG = 0.5  # length of arms relative to the longest limbs above the legs
 _MOST_ARMS = 2  # pairs that may be arms: ears of a rabbit are as long
 _LEANING = np.tan(np.radians(65.0))  # of a trunk that is upright: people bend, animals have 80
@@ -145,6 +148,11 @@ class Anatomy:
     def height(self) -> float:
         """Height of the highest voxel above the lowest."""
         return float(np.ptp(self.solid.centers(self.solid.voxels) @ self.up))
+
+    def rise(self, pair: LimbPair) -> float:
+        """Return how much higher a pair begins than its tips are, over its length."""
+        tips = np.array([limb.points[0] for limb in pair.limbs]) @ self.up
+        return float(pair.attachment @ self.up - tips.mean()) / pair.length
 
     def stands(self, pair: LimbPair) -> bool:
         """Return whether both tips of a pair are on the ground."""
@@ -389,9 +397,8 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
             if front is None or float(ahead @ front) > 0.0:
                 found.append(Plan(hind, fore, left))
         return found
-    # The corners of a cape or a coat are shorter than legs.
-    least = _AS_LONG * max((pair.length for pair in standing), default=0.0)
-    lowest = [pair for pair in standing if pair.length >= least] or anatomy.pairs
+    # The corners of a cape or a coat that reach the ground lead sideways, not up.
+    lowest = [pair for pair in standing if anatomy.rise(pair) >= _UPWARDS] or anatomy.pairs
     legs = min(lowest, key=lambda pair: heights[id(pair)])
     above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair) and not pair.is_bump]
     longest = max((pair.length for pair in above), default=0.0)
