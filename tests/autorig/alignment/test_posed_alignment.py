@@ -12,9 +12,10 @@ from viewer.autorig.alignment import pose_fit, posed_alignment
 from viewer.autorig.alignment.anatomy_fit import FADED, start_of_landmarks
 from viewer.autorig.alignment.icp import Cloud, Triangles
 from viewer.autorig.alignment.pose_fit import Fitted
-from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.posed_alignment import PosedAlignment, align_posed
+from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
-from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
 from viewer.rigs.geometry.samples import sample_surface
@@ -153,6 +154,28 @@ def test_long_arms_and_wide_hips_that_were_found_are_kept(monkeypatch):
     # 1.3 % apart if all that the surface does not show is as in the template again.
     size = np.ptp(target, axis=0).max()
     assert np.linalg.norm(places - joints * factors, axis=1).mean() < 0.009 * size
+
+
+def test_limbs_of_wrong_lengths_do_not_spoil_a_fit_at_the_right_place(standing):
+    figure, target, joints = standing
+    exact = Triangles(target.positions, target.triangles, 125)
+    cloud = Cloud(exact.samples, sample_surface(target.positions, target.triangles, 750))
+    pose, names = rest_pose(figure.skeleton), figure.skeleton.names
+    job = posed_alignment._Job(figure, pose, cloud, exact, True, AlignmentSettings(samples=125))
+    # Facing as the target does, upright and not far away, but with half of its thighs and arms.
+    lengths, ones = np.ones(len(names)), np.ones(len(names))
+    lengths[[i for i, name in enumerate(names) if name.endswith(("_hip", "_elbow"))]] = 0.5
+    short = resized(figure, limbs_of(figure), lengths, ones)
+    place = Similarity(1.1, np.diag([-1.0, 1.0, -1.0]), np.array([0.03, -0.1, 0.02]), np.ones(3))
+    posed = deform(short, pose)[0]
+    alignment = Alignment.of(Triangles(posed, short.mesh.triangles, 125), exact, place, "fit")
+    wrong = PosedAlignment(alignment, short, pose, posed, ())
+    found = posed_alignment._or_in_given_pose(job, wrong)
+    size = np.linalg.norm(np.ptp(target.positions, axis=0))
+    places = found.alignment.similarity.apply(joint_matrices(found.figure, found.pose)[:, :3, 3])
+    assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
+    # A close one stays as it is.
+    assert posed_alignment._or_in_given_pose(job, found) is found
 
 
 def bent(angle):

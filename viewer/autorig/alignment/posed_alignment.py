@@ -3,9 +3,10 @@
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
 similarity aligns one with the other. Unless the shapes are nearly the same, pose and proportions
 are therefore fitted from the limbs of the target (``anatomy_fit``) if it has those of the template.
-If not, or if the fit is poor, a similarity is searched and pose and proportions are fitted from
-there; the fit with the least distance between the surfaces, in both directions, is accepted if it
-removes most of the error. Feet decide which way a figure faces; if they are stumps, both facings
+If the fit is poor, another one begins there in the template's own pose and proportions. If there
+are no limbs, or the fit is still bad, a similarity is searched and pose and proportions are fitted
+from there; the fit with the least distance between the surfaces, in both directions, is accepted if
+it removes most of the error. Feet decide which way a figure faces; if they are stumps, both facings
 are fitted. If their surfaces hardly differ, the result has both: only a person can tell.
 """
 
@@ -52,7 +53,6 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.geometry.samples import sample_surface
-from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import Mesh, volume
 from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import joint_label
@@ -65,7 +65,7 @@ _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first value, after a joint was rotated by more than the second, indicates a
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_ENOUGH = 0.03  # misfit of fitted limbs up to which no other alignment is tried
+_ENOUGH = 0.03  # misfit of fitted limbs up to which no other alignment is searched
 _STRETCHES = 10  # number of iterations to stretch a template
 _ROUNDS = 30  # number of iterations to align the template facing the other way
 _FOUND = ("search", "in place")  # origins of alignments that were not given by the user
@@ -191,7 +191,7 @@ def align_posed(
             starts, solids = _starts(job, ours, theirs)
             by_limbs = _fits_of_limbs(job, starts)
     with part_of_work(span=(0.8, 1.0)):
-        return replace(_best(job, ours, kept, by_limbs), solids=solids)
+        return replace(_best(job, kept, by_limbs), solids=solids)
 
 
 def _stretched(job: _Job, ours: Posed, found: PosedAlignment) -> PosedAlignment | None:
@@ -265,16 +265,16 @@ def _starts(
     return sorted(found, key=lambda start: start.error), solids
 
 
-def _best(job: _Job, ours: Posed, kept: PosedAlignment, by_limbs: list[_LimbFit]) -> PosedAlignment:
+def _best(job: _Job, kept: PosedAlignment, by_limbs: list[_LimbFit]) -> PosedAlignment:
     """Return the closest of all fits if it removes most of the error."""
     rigid, best = kept.alignment, _best_of_limbs(job, by_limbs)
     is_part = rigid.away > PART and best is None
     before = misfit(rigid, is_part)
-    found = _fitted(job, _facing(job, ours, rigid, by_limbs))
+    found = _fitted(job, _facing(job, kept, by_limbs))
     is_whole = rigid.how == "search" and not is_part
     if kept.solids is not None and not by_limbs and is_whole and job.settings.facing is None:
         # The search compares the facings before a pose is fitted, and no feet were found.
-        back = _fitted(job, _facing_back(job, ours, rigid, job.template.up))
+        back = _fitted(job, _in_given_pose(job, kept, _half_turn(job)))
         pair = sorted((found, back), key=lambda fit: misfit(fit.alignment, False))
         found = _with_other(job, *pair)
     other = _if_better(kept, found, before, is_part)
@@ -351,21 +351,39 @@ def _doubtful_misfit(start: Start, fit: PosedAlignment) -> float:
     return gap if start.is_sure or start.is_usual else gap / _CLEARLY
 
 
-def _facing(job: _Job, ours: Posed, rigid: Alignment, by_limbs: list[_LimbFit]) -> Alignment:
+def _facing(job: _Job, kept: PosedAlignment, by_limbs: list[_LimbFit]) -> Alignment:
     """Return the alignment, reversed if all fits of limbs face the other way."""
+    rigid = kept.alignment
     if rigid.how not in _FOUND or rigid.away > PART or not by_limbs:
         return rigid
     # Columns of the rotations: the template's left and the starts' left in the target.
     left = rigid.similarity.rotation @ left_of(job.template, job.pose)
     if all(float(left @ start.plan.left) < 0.0 for start, _ in by_limbs):
-        return _facing_back(job, ours, rigid, job.template.up)
+        return _in_given_pose(job, kept, _half_turn(job))
     return rigid
 
 
 def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:
     """Fit a template to the surface whose limbs are already where the target's are."""
-    found = _fitted_marks(job, start.marked, start.fitted, start.marks)
+    with part_of_work(span=(0.0, 0.8)):
+        found = _fitted_marks(job, start.marked, start.fitted, start.marks)
+    if not (start.marks.kept == 1.0).any():
+        with part_of_work(span=(0.8, 1.0)):
+            found = _or_in_given_pose(job, found)
     return replace(found, alignment=replace(found.alignment, has_limbs=True), legs=start.legs)
+
+
+def _or_in_given_pose(job: _Job, found: PosedAlignment) -> PosedAlignment:
+    """Return a poor fit, or one that begins at its place in the given pose if that is much closer.
+
+    Trousers, and hands that touch the thighs, hide where limbs begin. Wrong lengths mislead a fit,
+    but place and facing are right, and may be all that is needed.
+    """
+    gap = misfit(found.alignment, False)
+    if gap <= _POOR:
+        return found
+    plain = _fitted(job, _in_given_pose(job, found))
+    return plain if misfit(plain.alignment, False) <= _KEPT * gap else found
 
 
 def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> PosedAlignment:
@@ -461,20 +479,30 @@ def _result(job: _Job, found: Fitted, how: AlignedBy) -> PosedAlignment:
     )
 
 
-def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: Up) -> Alignment:
-    """Return the template facing the other way, aligned with the target as well as possible."""
-    similarity = rigid.similarity
-    half = rotation_vector_to_matrix(np.pi * axis_direction(up))
-    middle = similarity.apply(ours.positions.mean(axis=0))
-    rotation = similarity.rotation @ half
-    shift = middle - similarity.scale * rotation @ ours.positions.mean(axis=0)
-    exact = Triangles(ours.positions, ours.triangles, job.settings.samples)
-    dense = sample_surface(ours.positions, ours.triangles, job.settings.dense)
-    cloud = Cloud(exact.samples, dense)
-    start = Similarity(similarity.scale, rotation, shift, similarity.factors)
+def _in_given_pose(job: _Job, fit: PosedAlignment, turn: Floats | None = None) -> Alignment:
+    """Return the template in the given pose, aligned with the target where a fit of it is.
+
+    ``turn``: rotation (3, 3) of the template before that, none by default.
+    """
+    posed = deform(job.template, job.pose)[0]
+    triangles = job.template.require_mesh().triangles
+    similarity = fit.alignment.similarity
+    placed = similarity.apply(fit.positions)
+    rotation = similarity.rotation if turn is None else similarity.rotation @ turn
+    scale = float(placed.std(axis=0).sum() / similarity.apply(posed).std(axis=0).sum())
+    scale *= similarity.scale
+    shift = placed.mean(axis=0) - scale * rotation @ posed.mean(axis=0)
+    exact = Triangles(posed, triangles, job.settings.samples)
+    cloud = Cloud(exact.samples, sample_surface(posed, triangles, job.settings.dense))
+    start = Similarity(scale, rotation, shift, similarity.factors)
     return Alignment.of(
         exact, job.exact, iterate(cloud, job.cloud, start, _ROUNDS, job.scales), "search"
     )
+
+
+def _half_turn(job: _Job) -> Floats:
+    """Return the rotation (3, 3) that makes the template face the other way."""
+    return rotation_vector_to_matrix(np.pi * axis_direction(job.template.up))
 
 
 def _gap_left(fit: PosedAlignment) -> Phrase:
