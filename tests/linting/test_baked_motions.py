@@ -111,11 +111,14 @@ def test_heels_are_known_if_the_rest_pose_does_not_stand():
         np.testing.assert_allclose(one.heel, expected.heel, atol=0.03)
 
 
-def lengths_of(names: tuple[str, ...], moving: int) -> list[str]:
+def lengths_of(
+    names: tuple[str, ...], moving: int, parents: tuple[int, ...] | None = None
+) -> list[str]:
     """Check a chain of joints, of which one moves away from its parent to twice the distance."""
     count = len(names)
     offsets = [[0.0, 1.0, 0.0], *([0.2, 0.0, 0.0] for _ in names[1:])]
-    figure = Figure("chain", skeleton=make_skeleton(names, [*range(-1, count - 1)], offsets))
+    skeleton = make_skeleton(names, [*(parents or range(-1, count - 1))], offsets)
+    figure = Figure("chain", skeleton=skeleton)
     places = np.zeros((FRAMES, count, 3))
     places[20:30, moving, 0] = 0.2
     actor = Actor(figure, clip=replace(standing(figure), translations=places))
@@ -129,6 +132,16 @@ def test_slots_and_controls_beyond_the_body_are_no_bones():
     assert lengths_of(names, 7) == []
     # Without known names, every chain is one of bones.
     assert lengths_of(tuple("abcdefghi"), 7) == ["C022"]
+
+
+def test_bones_of_a_hand_without_a_wrist_branch_off_at_the_elbow():
+    trunk, arm = ("Hips", "Spine", "Chest"), ("LeftArm", "LeftForeArm")
+    fingers = ("LeftHandIndex1", "LeftHandIndex2", "LeftHandMiddle1", "LeftHandMiddle2")
+    parents = (-1, 0, 1, 2, 3, 4, 5, 4, 7)
+    assert lengths_of((*trunk, *arm, *fingers), 5, parents) == ["C022"]
+    # At the chest, an arm of two bones and a head have no bones of their own.
+    parents = (-1, 0, 1, 2, 3, 2, 5, 2, 7)
+    assert lengths_of((*trunk, *arm, *fingers), 5, parents) == []
 
 
 def test_quick_swing_of_a_capture_is_no_jitter():

@@ -68,7 +68,8 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
     """Return which joints end a bone of a limb or chain: (J,).
 
     Its length is the distance to a parent that has a parent and no second branch: a shoulder on
-    the chest and a foot below the root (as IK controls are) have no bone of their own.
+    the chest and a foot below the root (as IK controls are) have no bone of their own. The bones of
+    a hand without a wrist branch off at the elbow.
     """
     parents = skeleton.parents
     n_below = np.zeros(len(parents), dtype=np.int64)
@@ -76,7 +77,8 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
     branches = np.zeros(len(parents), dtype=np.int64)
     np.add.at(branches, parents[(parents >= 0) & (n_below > 0)], 1)
     above = np.where(parents >= 0, parents, 0)
-    bones: Bools = (parents >= 0) & (parents[above] >= 0) & (branches[above] <= 1)
+    bends = np.array([each.endswith(("_elbow", "_knee")) for each in joint_meanings(skeleton)])
+    bones: Bools = (parents >= 0) & (parents[above] >= 0) & ((branches[above] <= 1) | bends[above])
     bones &= (n_below > 0) | (n_below[above] == 1)
     if figure.skin is not None and figure.is_attached:
         moves = moves_vertices(figure.skin)
