@@ -251,3 +251,18 @@ def test_teleport_in_a_clip_of_keys_is_a_jump():
     assert found.diagnostic.key == "C003.joint" and found.frames.tolist() == [30]
     # 0.2 m in 1/30 s; the limit is 5 times the size of 0.922 m per second.
     assert "pelvis moves at 6 m/s" in found.message and "limit 4.61 m/s" in found.message
+
+
+def test_elbow_of_an_arm_without_a_wrist_is_checked():
+    """Two fingers begin at the hand; for 9 frames, the elbow is 40 degrees beyond straight."""
+    names = ("pelvis", "spine", "left_shoulder", "left_elbow", "left_index1", "left_middle1")
+    offsets = [[0, 1, 0], [0, 0.5, 0], [0.2, 0, 0], [0.3, 0, 0], [0.3, 0, 0.02], [0.3, 0, -0.02]]
+    figure = Figure("arm", skeleton=make_skeleton(names, [-1, 0, 1, 2, 3, 3], offsets), unit="m")
+    bends = waving()
+    bends[30:39] = -40.0
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    turns[:, 3] = about_z(bends)
+    clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 6, 3)))
+    (found,) = hinges.check(Subject(Actor(figure, clip=clip)))
+    assert found.joints.tolist() == [3] and found.diagnostic.values["angle"] == pytest.approx(40.0)
+    assert sorted(found.frames.tolist()) == [*range(30, 39)]

@@ -9,7 +9,7 @@ the frame numbers that the timeline shows.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import field
 from typing import Literal
 
@@ -271,6 +271,19 @@ def travelling_joints(track: Track, skeleton: Skeleton) -> Ints:
             n_below[skeleton.parents[joint]] += n_below[joint]
     moved = (moves * track.scale > _STAYS * track.size) & (n_below > _MOST_JOINTS * len(n_below))
     return np.flatnonzero(carries | moved).astype(np.int32)
+
+
+def ends_of(limb: Sequence[str], names: Sequence[str], skeleton: Skeleton) -> list[int]:
+    """Return the joints at the end of a limb: wrist or ankle, or else those of a hand or foot.
+
+    ``limb``: meanings of its upper part, hinge and end; ``names``: those of all joints. Empty
+    without a hinge.
+    """
+    if limb[2] in names:
+        return [names.index(limb[2])]
+    if limb[1] not in names:
+        return []
+    return np.flatnonzero(skeleton.parents == names.index(limb[1])).tolist()
 
 
 def world_turns(rotations: Floats, skeleton: Skeleton, joint: int) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Indices, Subject, track_of, world_turns
+from viewer.linting._subject import Indices, Subject, ends_of, track_of, world_turns
 from viewer.linting._surface import FEWEST, support_of
 from viewer.phrases import counted
 from viewer.rigs.arrays import Bools, Floats
@@ -16,14 +16,14 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import nearest_rotations, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.memo import Memo
-from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
 from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.skin import bind_positions
 
 _CHEST = ("spine3", "spine2", "spine1")
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3")
 _ENDS = ("neck", "head")
-_HANDS = ("left_wrist", "right_wrist")
+_ARMS = tuple(limb for limb in LIMBS if limb[2].endswith("_wrist"))
 # The trunk is compared in slices across its axis, in the space of the chest. Hands that touch the
 # body have their wrist near the skin; none is in the inner half of a closed slice.
 _SLICES, _SECTORS = 48, 8
@@ -86,8 +86,12 @@ def check(subject: Subject) -> Iterator[Finding]:
     # Scene to figure axes, then to those of the chest.
     linear = subject.actor.placement[:3, :3] / track.scale**2
     turns = quaternion_to_matrix(world_turns(track.rotations, skeleton, trunk.chest))
-    for hand in (names.index(name) for name in _HANDS if name in names):
-        offsets = (track.positions[:, hand] - track.positions[:, trunk.chest]) @ linear
+    for arm in _ARMS:
+        ends = ends_of(arm, names, skeleton)
+        if not ends:
+            continue
+        hand = track.positions[:, ends].mean(axis=1)
+        offsets = (hand - track.positions[:, trunk.chest]) @ linear
         inside = trunk.inside(np.einsum("fba,fb->fa", turns, offsets)) & track.present
         rows = track.of_each(np.flatnonzero(inside))
         if len(rows) < _FRAMES:
@@ -96,10 +100,10 @@ def check(subject: Subject) -> Iterator[Finding]:
             "C025.hand: {n}: {joint} is deep inside the body, from frame {frame} on",
             n=counted(len(rows), "frame", of=track.n_frames),
             all=track.n_frames,
-            joint=joint_labels(skeleton)[hand],
+            joint=joint_labels(skeleton)[ends[0]],
             frame=int(track.numbers[rows[0]]),
             part="clip",
-            joints=[hand],
+            joints=ends,
             frames=track.numbers[rows],
             times=track.times[rows],
             at=("frames", int(rows[0])),

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Subject, Track, track_of, world_turns
+from viewer.linting._subject import Subject, Track, ends_of, track_of, world_turns
 from viewer.phrases import counted
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
@@ -31,24 +31,31 @@ def check(subject: Subject) -> Iterator[Finding]:
         return
     names = joint_meanings(skeleton)
     for limb in LIMBS:
-        if all(name in names for name in limb):
-            joints = [names.index(name) for name in limb]
+        ends = ends_of(limb, names, skeleton)
+        if limb[0] in names and limb[1] in names and ends:
             # A leg that hardly bends otherwise bends away from the toes.
             toe = limb[2].replace("_ankle", "_foot")
-            joints += [names.index(toe)] if toe != limb[2] and toe in names else []
-            yield from _hinge(subject, track, skeleton, joints)
+            toes = [names.index(toe)] if toe != limb[2] and toe in names else []
+            upper, hinge = (names.index(name) for name in limb[:2])
+            yield from _hinge(subject, track, skeleton, (upper, hinge), ends, toes)
 
 
 def _hinge(
-    subject: Subject, track: Track, skeleton: Skeleton, joints: list[int]
+    subject: Subject,
+    track: Track,
+    skeleton: Skeleton,
+    joints: tuple[int, int],
+    ends: list[int],
+    toes: list[int],
 ) -> Iterator[Finding]:
-    """Check a limb: its upper part, hinge and lower part, and the ball of the foot if known."""
+    """Check a limb: its upper part and hinge, its ends, and the ball of the foot if known."""
     rows = np.flatnonzero(track.present)
     if len(rows) == 0:
         return
-    places, (upper, hinge, lower) = track.positions[rows], joints[:3]
+    places, (upper, hinge) = track.positions[rows], joints
+    end = places[:, ends].mean(axis=1)
     thigh = unit(places[:, hinge] - places[:, upper])
-    shin = unit(places[:, lower] - places[:, hinge])
+    shin = unit(end - places[:, hinge])
     # The space of the upper part, in axes of the figure: only its changes matter.
     turns = world_turns(track.rotations[rows], skeleton, upper)
     to_figure = subject.actor.placement[:3, :3] / (track.scale or 1.0)
@@ -59,12 +66,12 @@ def _hinge(
     usual = unit(np.median(axes, axis=0))
     sides = np.einsum("fa,a->f", axes, usual)
     if np.quantile(np.where(sides > 0.0, bends, 0.0), _LARGER) < _USUAL:
-        if len(joints) < 4:
+        if not toes:
             return
         # The shin of a bent knee is behind, where the toes do not point: with the thigh down and
         # the toes ahead, thigh x shin points as toes x thigh does.
-        toes = unit(places[:, joints[3]] - places[:, lower])
-        ahead = np.einsum("fba,fb->fa", spaces, np.cross(toes, thigh) @ to_figure)
+        forwards = unit(places[:, toes[0]] - end)
+        ahead = np.einsum("fba,fb->fa", spaces, np.cross(forwards, thigh) @ to_figure)
         sides = np.einsum("fa,a->f", axes, unit(np.median(ahead, axis=0)))
     wrong = np.flatnonzero((sides < _OPPOSITE * lengths) & (bends > _WRONG))
     if len(wrong) == 0 or len(wrong) > _RARELY * len(rows):
