@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.autorig.alignment.icp import FEWEST, HOLD, SETTLED, Pairs, Side, pairs_between
+from viewer.autorig.alignment.icp import (
+    FEWEST,
+    SETTLED,
+    Side,
+    pairs_between,
+    rotation_columns,
+    solved_along,
+)
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.rigs.arrays import Floats
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
@@ -33,7 +40,9 @@ def fit_axes(
         # small rotation w, with x = f R p + f' (w x R p) + t. f' are the current factors: with f
         # there, the products of f and w would not be linear.
         columns = _columns(pairs.points, similarity.rotation, before, rotations)
-        found, vector, shift = _solved(pairs, columns)
+        solved = solved_along(pairs.normals, columns, pairs.targets)
+        found, shift = solved[:3], solved[3:6]
+        vector = solved[6:] if rotations else np.zeros(3)
         if (found <= 0.0).any():
             break
         scales = found
@@ -52,18 +61,5 @@ def _columns(points: Floats, rotation: Floats, before: Floats, rotations: bool) 
     scaled = arms[:, :, None] * np.eye(3)
     parts = [scaled, np.broadcast_to(np.eye(3), scaled.shape)]
     if rotations:
-        x, y, z = arms.T
-        null = np.zeros_like(x)
-        # Each column is a coordinate axis crossed with the lever arm.
-        crossed = np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
-        parts.append(lift[:, None] * crossed)
+        parts.append(lift[:, None] * rotation_columns(arms))
     return np.concatenate(parts, axis=2)
-
-
-def _solved(pairs: Pairs, columns: Floats) -> tuple[Floats, Floats, Floats]:
-    along = np.einsum("na,nak->nk", pairs.normals, columns)
-    rows = np.concatenate([along, HOLD * columns.reshape(-1, columns.shape[2])])
-    values = np.einsum("na,na->n", pairs.normals, pairs.targets)
-    solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * pairs.targets.ravel()]))[0]
-    vector = solved[6:] if len(solved) > 6 else np.zeros(3)
-    return solved[:3], vector, solved[3:6]

@@ -30,7 +30,7 @@ _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
 _EXACT = 1e-12  # ratio of error to size below which an alignment is exact
 _ON_EDGE = 1e-9  # barycentric coordinate below which a point is on an edge
-HOLD = 3e-3  # weight of point-to-point relative to point-to-plane distances, before squaring
+_HOLD = 3e-3  # weight of point-to-point relative to point-to-plane distances, before squaring
 _PATIENCE = 3  # iterations without improvement; new pairs may raise the error for a while
 FEWEST = 8  # minimum number of pairs for seven unknowns
 
@@ -174,18 +174,13 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     # Dividing by the size gives all unknowns the same magnitude.
     arms = arms / size
     gaps = (pairs.targets - moved) / size
-    # Columns: rotation, shift, scale; rows: along the normal, then along x, y and z.
-    x, y, z = arms.T
-    null = np.zeros_like(x)
-    rotations = np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
+    # Columns: rotation, shift, scale.
+    rotations = rotation_columns(arms)
     shifts = np.broadcast_to(np.eye(3), rotations.shape)
     whole = np.concatenate([rotations, shifts, arms[:, :, None]], axis=2)[
         :, :, : 7 if scales else 6
     ]
-    along = np.einsum("na,nak->nk", pairs.normals, whole)
-    rows = np.concatenate([along, HOLD * whole.reshape(-1, whole.shape[2])])
-    values = np.einsum("na,na->n", pairs.normals, gaps)
-    solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
+    solved = solved_along(pairs.normals, whole, gaps)
     rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
     grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these limits
@@ -194,6 +189,25 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     return Similarity(
         grow * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors
     )
+
+
+def rotation_columns(arms: Floats) -> Floats:
+    """Return the Jacobian of points by a small rotation about the origin of arms (N, 3)."""
+    # Each column is a coordinate axis crossed with the lever arm.
+    x, y, z = arms.T
+    null = np.zeros_like(x)
+    return np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
+
+
+def solved_along(normals: Floats, columns: Floats, gaps: Floats) -> Floats:
+    """Return the unknowns (K,) that close gaps (N, 3) along normals, and slightly on all axes.
+
+    ``columns``: (N, 3, K), the Jacobian of the points.
+    """
+    along = np.einsum("na,nak->nk", normals, columns)
+    rows = np.concatenate([along, _HOLD * columns.reshape(-1, columns.shape[2])])
+    values = np.einsum("na,na->n", normals, gaps)
+    return np.linalg.lstsq(rows, np.concatenate([values, _HOLD * gaps.ravel()]))[0]
 
 
 def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
