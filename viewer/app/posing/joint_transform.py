@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from imgui_bundle import imgui
@@ -85,37 +84,22 @@ def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
 def draw_translation(state: AppState, pose: Pose, joint: int, label: str) -> None:
     """Draw a joint's translation relative to its rest position, along the parent's axes."""
     speed = 0.002 * (box_size(state.box) or 1.0)
-
-    def draw_axis(hidden: str, axis: int) -> None:
-        shown = plain_zero(float(pose.translations[joint, axis]), "%.4f")
-        changed, moved = drag_float(state, hidden, shown, speed, "%.4f")
-        if changed and abs(moved) < _LARGEST:
-            pose.translations[joint, axis] = moved
-
-    _draw_row(state, f"{label}.translation", "move", joint, draw_axis)
+    _draw_row(state, f"{label}.translation", "move", joint, pose.translations, speed)
     if is_reset(f"{label}: translation from rest, along the parent's axes\n{_DRAGS}"):
         pose.translations[joint] = 0.0
 
 
 def draw_scale(state: AppState, pose: Pose, joint: int, label: str) -> None:
     """Draw the scale factors of a joint along its own axes."""
-    skeleton = state.actor.figure.require_skeleton()
-
-    def draw_axis(hidden: str, axis: int) -> None:
-        shown = plain_zero(float(pose.scales[joint, axis]), "%.4f")
-        changed, moved = drag_float(state, hidden, shown, 0.005, "%.4f")
-        if changed and abs(moved) < _LARGEST:
-            pose.scales[joint, axis] = moved
-
-    _draw_row(state, f"{label}.scale", "scale", joint, draw_axis)
+    _draw_row(state, f"{label}.scale", "scale", joint, pose.scales, 0.005)
     if is_reset(f"{label}: scale along its own axes\n{_DRAGS}"):
-        pose.scales[joint] = skeleton.rest_scales[joint]
+        pose.scales[joint] = state.actor.figure.require_skeleton().rest_scales[joint]
 
 
 def _draw_row(
-    state: AppState, name: str, text: str, joint: int, draw_axis: Callable[[str, int], None]
+    state: AppState, name: str, text: str, joint: int, values: Floats, speed: float
 ) -> None:
-    """Draw a label and three fields."""
+    """Draw a label and three fields, which change a joint's row of values (J, 3)."""
     imgui.align_text_to_frame_padding()
     start = imgui.get_cursor_pos_x()
     imgui.text_disabled(text)
@@ -123,7 +107,10 @@ def _draw_row(
     imgui.set_next_item_width(-1.0)
 
     def draw(hidden: str, axis: int) -> None:
-        draw_axis(hidden, axis)
+        shown = plain_zero(float(values[joint, axis]), "%.4f")
+        changed, moved = drag_float(state, hidden, shown, speed, "%.4f")
+        if changed and abs(moved) < _LARGEST:
+            values[joint, axis] = moved
         if imgui.is_item_activated():
             pause_for_edit(state)
         note_item(state, f"{name} {'xyz'[axis]}")
