@@ -256,3 +256,10 @@ def test_ball_has_no_plan(monkeypatch):
 def test_mesh_without_area_is_refused():
     with pytest.raises(RigError, match="expected a mesh with an area, found none"):
         anatomy_of(np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0]]), np.array([[0, 1, 2]]), UP)
+
+
+def test_thin_triangle_beside_every_plane_has_no_plan():
+    """Nothing is in the best plane, from which limbs are measured."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    anatomy = anatomy_of(corners, np.array([[0, 1, 2]]), UP)
+    assert plans_of(anatomy, False) == []

@@ -192,7 +192,9 @@ def _divided(
     centers = solid.centers(solid.voxels)
     sides = centers @ lateral - offset
     steps = paths.steps
-    middle = _middle(steps, np.abs(sides) <= 1.01 * solid.spacing)
+    distant = np.abs(sides)
+    # Nothing is in the plane between two separate parts, or of a mesh as thin as a triangle.
+    middle = _middle(steps, distant <= max(1.01 * solid.spacing, float(distant.min())))
     distances, _, sources = csgraph.dijkstra(
         steps, indices=middle, min_only=True, return_predecessors=True
     )
