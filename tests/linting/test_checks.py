@@ -290,6 +290,22 @@ def test_open_sheet_without_its_border_is_not_closed(tmp_path, n, height):
     assert "M003" not in codes(tmp_path, mesh, lost=range(0, len(mesh[1]), 2))
 
 
+def test_sheet_on_another_one_is_not_flipped_by_an_edge_that_they_share(tmp_path):
+    """A badge of two by two squares, whose middle sticks out, at one side of a plate of six by six:
+    two of its edges are those of the border of the plate, and the others have three triangles.
+    """
+    y, x = np.divmod(np.arange(49), 7)
+    plate = np.stack([x, y, 0 * x], axis=1).astype(float)
+    badge = plate[(x > 1) & (x < 5) & (y < 3)]
+    badge[4, 2] = 0.1
+    triangles = grid(7, wraps=False)
+    both = np.concatenate([plate, badge]), np.concatenate([triangles, grid(3, wraps=False) + 49])
+    assert "M002" not in codes(tmp_path, both)
+    patch = np.isin(triangles, np.flatnonzero((x > 1) & (x < 5) & (y < 3))).all(axis=1)
+    triangles[patch] = triangles[patch, ::-1]
+    assert patch.sum() == 8 and "M002" in codes(tmp_path, (plate, triangles))
+
+
 def test_closed_surface_with_few_lost_triangles_is_still_inside_out(tmp_path):
     mesh = ring(12)  # the square of 8 open edges is less than a quarter of the 288 triangles
     assert codes(tmp_path, mesh) == {"M003"}

@@ -16,6 +16,7 @@ from viewer.rigs.geometry.topology import (
     CLOSED,
     HOLLOW,
     Edges,
+    components,
     edges_of,
     orientations,
     part_volumes,
@@ -128,6 +129,7 @@ def _sides(
     """Report flipped triangles, inside-out or non-orientable components, and open borders."""
     edges = edges_of(corners)
     component, flipped, one_sided = orientations(len(corners), edges)
+    flipped &= _are_joined(flipped, edges)
     if flipped.any():
         triangles = valid[flipped]
         yield subject.found(
@@ -159,6 +161,22 @@ def _sides(
     signs = np.where(flipped, -1.0, 1.0) * known[valid]
     yield from _inside_out(subject, mesh, valid, component, signs, edges)
     yield from _borders(subject, mesh, valid, border)
+
+
+def _are_joined(flipped: Bools, edges: Edges) -> Bools:
+    """Return which triangles (T,) are of a flipped patch that the surface goes on around.
+
+    Of a sheet that lies on another one, such as a badge on a shield, edges coincide with those of
+    two other triangles, but for a few by chance.
+    """
+    both = edges.pairs[flipped[edges.pairs].all(axis=1) & edges.agree]
+    patch = components(len(flipped), both)
+    against = edges.pairs[(flipped[edges.pairs].sum(axis=1) == 1) & ~edges.agree]
+    n_against = np.bincount(patch[against[flipped[against]]], minlength=len(flipped))
+    crowded = np.flatnonzero(edges.counts > 2) // 3
+    n_crowded = np.bincount(patch[crowded], minlength=len(flipped))
+    joined: Bools = (n_against >= n_crowded)[patch]
+    return joined
 
 
 def _borders(subject: Subject, mesh: Mesh, valid: Indices, border: Bools) -> Iterator[Finding]:
