@@ -190,6 +190,15 @@ def test_options_of_a_motion_need_one(tmp_path, capsys, words):
     assert message in capsys.readouterr().err
 
 
+def test_folder_of_a_single_frame_is_refused(tmp_path, capsys):
+    (tmp_path / "one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert run(["rig", str(tmp_path), "-o", str(tmp_path / "rig.glb")]) == 2
+    assert capsys.readouterr().err == (
+        f"viewer: {tmp_path}: expected at least 2 frames of a mesh, found 1; to rig it at rest, "
+        "name the file one.obj\n"
+    )
+
+
 def test_folder_of_frames_is_a_sequence(tmp_path, capsys):
     positions, faces = two_boxes()
     write_frames(tmp_path, "box", positions, faces)

@@ -353,7 +353,13 @@ def _sequence(files: Sequence[str]) -> list[Path]:
     """Return the frames of a mesh if the arguments are such files, or one folder of them."""
     paths = [Path(file) for file in files]
     if len(paths) == 1 and paths[0].is_dir():
-        paths = [path for path in paths[0].iterdir() if path.suffix.lower() in SEQUENCES]
+        folder, inside = paths[0], [*paths[0].iterdir()]
+        paths = [path for path in inside if path.suffix.lower() in SEQUENCES]
+        if len(paths) == len(inside) == 1:
+            raise ViewerError(
+                f"{printable(folder, 300)}: expected at least 2 frames of a mesh, found 1; to rig "
+                f"it at rest, name the file {printable(paths[0].name, 60)}"
+            )
     if len(paths) > 1 and all(path.suffix.lower() in SEQUENCES for path in paths):
         return paths
     return paths if stores_frames(paths) else []
