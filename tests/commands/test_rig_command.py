@@ -183,6 +183,16 @@ def test_options_reach_the_transfer(folder, tmp_path, capsys, seen):
     assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
 
 
+def test_skeleton_found_in_the_shape_stays_where_it_is(tmp_path, capsys, seen):
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = Mesh(corners, vertex_normals(corners, triangles), triangles)
+    export(Actor(Figure("scan", mesh)), tmp_path / "scan.obj")
+    assert run(["rig", str(tmp_path / "scan.obj"), "--auto"]) == 130
+    # Given so, it is not moved, even if joints are outside of the mesh.
+    assert_allclose(seen["settings"].alignment.matrix, np.eye(4), atol=0.0)
+
+
 def test_mesh_of_a_gltf_file_without_a_skin_has_no_rig(tmp_path, capsys, seen):
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])

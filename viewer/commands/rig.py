@@ -602,7 +602,7 @@ def _settings(
     if arguments.smooth < 0:
         raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
     # A skeleton found in the mesh is where it should be.
-    alignment = AlignmentSettings()
+    alignment = AlignmentSettings(matrix=np.eye(4))
     if not arguments.auto:
         up = arguments.up or stated_up(target_up)
         alignment = settings_of(AlignmentSettings, arguments, landmarks=landmarks, up=up)

@@ -424,10 +424,14 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
                 asked = found
                 return lambda state: put_question(state, template, asked, go_on)
             aligned = found.fitted or template
+        # Joints found in the shape are where they should be.
+        matrix = np.eye(4) if template.key == SHAPE else None
+        if found is not None:
+            matrix = found.similarity.matrix
         results = []
         for number, method in enumerate(methods):
             low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
-            settings = _transfer_settings(choices, method, found)
+            settings = _transfer_settings(choices, method, matrix)
             called = f"{name} {_CALLED[method]}"
             with part_of_work(f"{printable(name, 40)}, {method}", (low, high)):
                 rigged = transfer(aligned.figure, aligned.pose, mesh, settings, called)
@@ -539,15 +543,12 @@ def _match_settings(choices: RigChoices) -> MatchSettings:
 
 
 def _transfer_settings(
-    choices: RigChoices, method: TransferMethod, placing: Placing | None
+    choices: RigChoices, method: TransferMethod, matrix: Floats | None
 ) -> TransferSettings:
-    """Return the settings to transfer the rig of a template placed so, or not at all (None)."""
-    alignment = AlignmentSettings()
-    if placing is not None:
-        alignment = AlignmentSettings(matrix=placing.similarity.matrix)
+    """Return the settings to transfer the rig of a template at a place, searched for if None."""
     return TransferSettings(
         method=method,
-        alignment=alignment,
+        alignment=AlignmentSettings(matrix=matrix),
         weights=WeightSettings(
             match=_match_settings(choices),
             smoothing_rounds=choices.smoothing,
