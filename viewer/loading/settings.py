@@ -127,17 +127,18 @@ class MotionSettings:
     joint_map: JointMap | None = None
     """Joints of driven figures and the joints that drive them; None to match them by name."""
 
-    def drive_of(self, motion: SkeletonMotion, hangs: bool = False) -> Drive:
-        """Return a motion that drives figures; ``hangs``: its up axis points down."""
+    def drive_of(self, motion: SkeletonMotion) -> Drive:
+        """Return a motion that drives figures."""
         from viewer.rigs.retargeting.drive import Drive
+        from viewer.rigs.retargeting.retarget import with_tips
 
         return Drive(
-            motion,
+            with_tips(motion),
             self.source_rest,
             self.joint_map,
             plants_feet=self.feet,
             keeps_hands=self.hand_contact,
-            hangs=hangs,
+            hangs=motion.hangs,
         )
 
 

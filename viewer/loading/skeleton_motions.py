@@ -69,8 +69,8 @@ def give_skeleton_motion(
             remedy=Remedy("Up axis in Preferences", "--up"),
         )
     _check_rest(path, motion, settings)
-    placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
-    drive = settings.drive_of(motion, hangs=settings.up.startswith("-"))
+    placement = rotation_transform(0, np.pi) if motion.hangs else np.eye(4)
+    drive = settings.drive_of(motion)
     if settings.drives and model is not None:
         try:
             clip, notes = driven_clip(drive, model)
@@ -107,7 +107,8 @@ def as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion
         motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as requested")
     if settings.up:
         up: Up = "z" if settings.up.endswith("z") else "y"
-        motion = replace(motion, figure=replace(motion.figure, up=up), up_notes=())
+        figure, hangs = replace(motion.figure, up=up), settings.up.startswith("-")
+        motion = replace(motion, figure=figure, up_notes=(), hangs=hangs)
     if settings.frame_rate is not None:
         timing = replace(motion.clip.timing, frame_rate=settings.frame_rate)
         motion = replace(motion, clip=replace(motion.clip, timing=timing))

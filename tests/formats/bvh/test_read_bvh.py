@@ -9,11 +9,13 @@ from builders import axis_turn
 from formats.bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from rigs.retargeting.trotting import animal
 from rigs.retargeting.two_people import figure_of
 
 from viewer.formats import Source, detect
 from viewer.formats.bvh import guess_up
+from viewer.loading import MotionSettings, load
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
@@ -333,7 +335,7 @@ def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs():
     assert np.ptp(points[:, 2]) > 2.0 * np.ptp(points[:, 1])
     timing = Timing(30.0, np.zeros(1, dtype=np.int32))
     still = SampledClip("", timing, figure.skeleton.rest_rotations[None])
-    up, _, warnings = guess_up(figure, still, points)
+    up, _, warnings, _ = guess_up(figure, still, points)
     assert (up, warnings) == ("y", ())
 
 
@@ -349,6 +351,24 @@ def test_the_axis_along_which_frames_are_upright_is_up():
             "frames, although along +y in the rest pose"
         )
     ]
+
+
+def test_skeleton_upside_down_at_rest_and_in_the_frames_hangs(tmp_path):
+    """In the space of many cameras, y points down; such people stood on their heads."""
+    text = GOOD.replace("0.0 -0.9 0.0", "0 0.9 0").replace("0.0 0.6 0.0", "0 -0.6 0")
+    rows = "0 0 1 0 0 0 0 0 0 0 0 0 0 0 0\n" * 2
+    text = text.partition("0.0333333\n")[0] + "0.0333333\n" + rows
+    motion, warnings = read(text)
+    assert motion.hangs and motion.figure.up == "y"
+    assert warnings == [
+        "-y up assumed: the skeleton is upright along -y at rest and in the frames, and is rotated "
+        "upright"
+    ]
+    path = tmp_path / "a.bvh"
+    path.write_text(text)
+    for up, sign in (("", -1.0), ("y", 1.0), ("-y", -1.0)):
+        (actor,) = load(path, motion=MotionSettings(up=up)).actors
+        assert_allclose(actor.placement[1], [0, sign, 0, 0], atol=1e-12)
 
 
 def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis():

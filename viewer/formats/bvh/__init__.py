@@ -202,9 +202,10 @@ def skeleton_motion(table: Table, clip: SampledClip) -> SkeletonMotion:
     points = np.concatenate([joints, np.reshape(tips, (-1, 3))])
     unit, facts, unit_note = guess_unit(points)
     figure = Figure(clip.name, skeleton=skeleton, unit=unit)
-    up, more, up_notes = guess_up(figure, clip, points)
+    up, more, up_notes, hangs = guess_up(figure, clip, points)
     facts += (*more, ("frames", f"{clip.timing.n_frames} at {clip.timing.frame_rate:g} fps"))
-    return SkeletonMotion(replace(figure, up=up, facts=facts), clip, unit_note, up_notes)
+    figure = replace(figure, up=up, facts=facts)
+    return SkeletonMotion(figure, clip, unit_note, up_notes, hangs)
 
 
 def _boxes(table: Table, parents: Ints) -> Floats:
@@ -334,8 +335,8 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
 
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
-) -> tuple[Up, Facts, tuple[Phrase, ...]]:
-    """Return the up axis, facts and notes, from the rest pose (P, 3) and from the frames."""
+) -> tuple[Up, Facts, tuple[Phrase, ...], bool]:
+    """Return the up axis, facts, notes and whether it points down, from rest (P, 3) and frames."""
     # Animals are longer than high; y is up if their legs then reach the ground. If the skeleton is
     # upright along another axis in the frames, that one is up, because some programs rotate the
     # root of a skeleton with y up into a world with z up.
@@ -347,12 +348,12 @@ def guess_up(
     )
     if not upper or not lower:
         if _stands_on_four_legs(skeleton, points):
-            return "y", (("up", "y, the rest skeleton stands on its legs"),), ()
+            return "y", (("up", "y, the rest skeleton stands on its legs"),), (), False
         _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
         if high > _LONG * deep:
             note = Phrase("{up} up assumed: the rest skeleton is longest along {up}", up="z")
-            return "z", (("up", "z, along which the rest skeleton is longest"),), (note,)
-        return "y", (), ()
+            return "z", (("up", "z, along which the rest skeleton is longest"),), (note,), False
+        return "y", (), (), False
     joints = points[: skeleton.n_joints]
     rest = _axis(joints[upper].mean(axis=0) - joints[lower].mean(axis=0))
     up: Up = "z" if rest == "+z" else "y"
@@ -369,21 +370,29 @@ def guess_up(
                 up=up,
                 axis=stands,
             )
-            return up, (("up", f"{up}, from the rest skeleton"),), (note,)
+            return up, (("up", f"{up}, from the rest skeleton"),), (note,), False
         note = Phrase(wording.UP_OF_FRAMES, up=other, axis=rest or Phrase("no axis"))
-        return other, (("up", f"{other}, from the frames"),), (note,)
+        return other, (("up", f"{other}, from the frames"),), (note,), False
+    if rest == stands and rest in ("-y", "-z"):
+        note = Phrase(
+            "{axis} up assumed: the skeleton is upright along {axis} at rest and in the frames, "
+            "and is rotated upright",
+            axis=rest,
+        )
+        up = "z" if rest == "-z" else "y"
+        return up, (("up", f"{rest}, from the rest skeleton"),), (note,), True
     if up == "z":
         note = Phrase("{up} up assumed: the head is above the feet along {up}", up="z")
-        return "z", (("up", "z, from the rest skeleton"),), (note,)
+        return "z", (("up", "z, from the rest skeleton"),), (note,), False
     if rest == "+y":
-        return "y", (("up", "y, from the rest skeleton"),), ()
+        return "y", (("up", "y, from the rest skeleton"),), (), False
     if stands == "+y":
         note = Phrase(wording.UP_OF_FRAMES, up="y", axis=rest or Phrase("no axis"))
-        return "y", (("up", "y, from the frames"),), (note,)
+        return "y", (("up", "y, from the frames"),), (note,), False
     note = Phrase(
         "{up} up assumed, although the rest skeleton is upright along {axis}", up="y", axis=rest
     )
-    return "y", (("up", "y, assumed"),), (note,) if rest else ()
+    return "y", (("up", "y, assumed"),), (note,) if rest else (), False
 
 
 def _lies(posed: Floats, along: str, up: Up, size: float) -> bool:

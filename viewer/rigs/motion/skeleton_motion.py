@@ -24,6 +24,8 @@ class SkeletonMotion:
     """Explains how the figure's unit was estimated; None if it was not estimated."""
     up_notes: tuple[Phrase, ...] = ()
     """Explain how the up axis was estimated, and state any contrary evidence."""
+    hangs: bool = False
+    """Whether the up axis of the figure points down, as in the space of many cameras."""
     expressions: Mapping[str, Floats] = field(default_factory=dict)
     """mapping of str to (N,). Weights of facial expressions at each row of the clip, by their names
     in VRM 1.0."""

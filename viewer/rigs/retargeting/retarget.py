@@ -79,7 +79,7 @@ def retarget(
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
         raise RigError(note("F004.no-skeleton: {figure} has no skeleton to animate", figure=named))
-    motion = _with_tips(_in_path_unit(motion))
+    motion = _in_path_unit(motion)
     source = motion.figure.require_skeleton()
     matches = match_joints(source, target, joint_map, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
@@ -194,7 +194,7 @@ def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
     return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
 
 
-def _with_tips(motion: SkeletonMotion) -> SkeletonMotion:
+def with_tips(motion: SkeletonMotion) -> SkeletonMotion:
     """Return a motion whose forearms and shins without a hand or foot end in a joint.
 
     Without one, the direction of the bone is unknown: the figure's elbows and knees would keep the
