@@ -64,7 +64,7 @@ def test_help_states_each_default_once():
     [
         (("--tail", "9.5"), "--tail: expected 0 to 9, found 9.5"),
         (("--tail", "nan"), "expected a finite number, found nan"),
-        (("--knots", "2.5"), "invalid int value"),
+        (("--knots", "2.5"), 'expected an integer, found "2.5"'),
         (("--colour", "green"), "expected one of red, blue"),
     ],
 )

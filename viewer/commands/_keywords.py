@@ -30,18 +30,6 @@ class _KeywordParser(Parser):
         """Raise ViewerError without advice about the command line."""
         raise ViewerError(message.removeprefix("argument ").replace(FILES_BEFORE, ""))
 
-    def _get_value(self, action: argparse.Action, arg_string: str) -> object:
-        """Return the value of an option; argparse would name the function that reads it."""
-        try:
-            return super()._get_value(action, arg_string)
-        except argparse.ArgumentError as problem:
-            if not str(problem.message).startswith("invalid "):
-                raise
-            wanted = str(action.metavar) if "|" in str(action.metavar) else "a number"
-            raise argparse.ArgumentError(
-                action, f'expected {wanted}, found "{printable(arg_string, 60)}"'
-            ) from None
-
 
 def paths_of(name: str, what: object, kinds: str = "a scene, an actor or paths") -> list[str]:
     """Return paths or names of models: one, or a sequence of them.

@@ -75,6 +75,18 @@ class Parser(argparse.ArgumentParser):
             near = question([bare[one] for one in near_names(name.lstrip("-"), bare)])
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
+    def _get_value(self, action: argparse.Action, arg_string: str) -> object:
+        """Return the value of an option; argparse would name the function that reads it."""
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as problem:
+            if not str(problem.message).startswith("invalid "):
+                raise
+            wanted = "an integer" if action.type is int else "a number"
+            wanted = str(action.metavar) if "|" in str(action.metavar) else wanted
+            found = printable(arg_string, _LONGEST)
+            raise argparse.ArgumentError(action, f'expected {wanted}, found "{found}"') from None
+
     def _check_value(self, action: argparse.Action, value: object) -> None:
         """Raise for a value that is not one of an option's choices; suggest the nearest."""
         from viewer.near_names import did_you_mean
