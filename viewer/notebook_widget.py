@@ -11,9 +11,11 @@ from typing import Any
 import anywidget
 import numpy as np
 import traitlets
+from numpy.typing import ArrayLike
 
 from viewer.errors import ViewerError
 from viewer.notebook import page_of, picture
+from viewer.rigs.arrays import Floats
 from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import find_joint
@@ -156,7 +158,11 @@ class ShownActor:
         self.actor.pose = pose
         self._widget._show(self._index)
 
-    def __setitem__(self, joint: str, rotation: Sequence[float]) -> None:
+    def __getitem__(self, joint: str) -> Floats:
+        """Return the rotation of a joint, as ``Actor`` does."""
+        return self.actor[joint]
+
+    def __setitem__(self, joint: str, rotation: ArrayLike) -> None:
         """Rotate a joint as ``Actor`` does, and show it."""
         self.actor[joint] = rotation
         self._widget._show(self._index)

@@ -264,6 +264,8 @@ TINY = (32, 24)
     ("call", "message"),
     [
         (lambda: viewer.export([ACT], "x.glb"), "^export: expected a scene or an actor, found"),
+        (lambda: viewer.export(leg(), "x.glb"), r"found Figure; viewer\.Actor\(figure\) is one$"),
+        (lambda: viewer.export(ACT, "x.mp4"), r'for ".mp4"; .*, as do .* and viewer\.video$'),
         (lambda: viewer.export(ACT, 3), "^path: expected a text or Path, found int"),
         (lambda: viewer.export(ACT, "x.glb", frames="1:2"), r"^frames: expected a range such as"),
         (lambda: viewer.export(ACT, "x.bvh", fps=0), "^fps: expected 0.001 to 100,000 frames per"),

@@ -79,6 +79,12 @@ def test_rotations_of_every_representation_turn_the_knee(kind):
         assert_allclose(actor.joints(time=0.1), joints[1])
 
 
+@pytest.mark.parametrize("kind", [np.uint32, np.uint64])
+def test_parents_may_be_those_of_a_kintree_table(kind):
+    parents = np.array([-1, 0]).astype(kind)  # 4294967295 or more for the root
+    assert square(parents=parents).skeleton.parents.tolist() == [-1, 0]
+
+
 def test_absent_frames_are_not_a_number():
     turns = np.zeros((3, 2, 3))
     actor = viewer.animate(square(), turns, present=[True, False, True])
@@ -164,7 +170,11 @@ def test_arrays_that_do_not_fit_are_named(changes, message):
     ("rotations", "keywords", "message"),
     [
         (np.zeros((3, 2, 5)), {}, r"rotations: expected one of .*, found shape \(3, 2, 5\)"),
-        (np.zeros((3, 2, 3)), {"representation": "euler"}, 'expected one of .*, found "euler"'),
+        (
+            np.zeros((3, 2, 3)),
+            {"representation": "euler"},
+            'representation: .*, "6d", found "euler"',
+        ),
         (np.zeros((3, 9, 3)), {}, r"rotations: expected shape \(N, 2, 3\), found \(3, 9, 3\)"),
         (-np.tile(np.eye(3), (3, 2, 1, 1)), {}, r"rotations\[0, 0\]: expected a rotation matrix"),
         (2 * np.tile(np.eye(3), (3, 2, 1, 1)), {}, r"rotations\[0, 0\]: expected a rotation"),

@@ -256,10 +256,15 @@ def exporters_of(path: str | Path, content: Content) -> list[str]:
     raise UnsupportedFormatError(f'{what} for "{suffix or FOLDER}"; supported: {known}')
 
 
+_DRAWN = (".png", ".jpg", ".jpeg", ".gif", ".mp4", ".webm")
+
+
 def no_exporter(path: str | Path) -> UnsupportedFormatError:
     """Return the error of a suffix that nothing writes."""
     known = ", ".join([known_suffixes(), *(f".{each.name}" for each in plugins_of("exporters"))])
     suffix = Path(path).suffix.lower() or FOLDER
+    if suffix in _DRAWN:
+        known += "; viewer render draws pictures and videos, as do viewer.render and viewer.video"
     return UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
 
 

@@ -14,7 +14,7 @@ from viewer.arguments import check_type
 from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.formats._references import read_picture
-from viewer.phrases import all_of
+from viewer.phrases import all_of, printable
 from viewer.rigs.arrays import Bools, Bytes, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import rotation_vector_to_quaternion
@@ -102,7 +102,8 @@ def figure(
     joints : (J, 3), optional
         Rest positions of the joints; they rotate about the axes of the figure.
     parents : (J,) of int, optional
-        Parent of each joint, before its children; -1 for a root. By default, a chain.
+        Parent of each joint, before its children; -1 for a root. By default, a chain. The first
+        row of ``kintree_table`` of body models fits.
     names : sequence of J str
         Names of the joints; ``joint_0`` and so on by default.
     uvs : (V, 2), optional
@@ -294,6 +295,9 @@ def _skeleton(joints: Floats, parents: ArrayLike | None, names: Sequence[str]) -
             f"parents: expected integers of shape ({count},), found {above.dtype} of shape "
             f"{above.shape}"
         )
+    # Unsigned integers, as in ``kintree_table`` of body models, hold -1 as their largest number.
+    if above.dtype.kind == "u":
+        above = above.astype(f"i{above.dtype.itemsize}")
     late = np.flatnonzero((above >= np.arange(count)) | (above < -1))
     if len(late):
         joint = int(late[0])
@@ -347,10 +351,12 @@ def _quaternions(rotations: ArrayLike, n_joints: int, representation: Rotations 
     kind = representation
     if kind is None:
         kind = next((each for each, shape in _SHAPES.items() if found.shape[2:] == shape), None)
-    if kind not in _SHAPES:
+    elif kind not in _SHAPES:
+        known = all_of([f'"{each}"' for each in _SHAPES])
+        raise RigError(f'representation: expected one of {known}, found "{printable(kind, 60)}"')
+    if kind is None:
         known = all_of([f"(F, J, {', '.join(map(str, shape))})" for shape in _SHAPES.values()])
-        what = f'"{kind}"' if kind is not None else f"shape {found.shape}"
-        raise RigError(f"rotations: expected one of {known}, found {what}")
+        raise RigError(f"rotations: expected one of {known}, found shape {found.shape}")
     values = _numbers("rotations", found, (None, n_joints, *_SHAPES[kind]))
     if not len(values):
         raise RigError("rotations: expected at least one frame, found none")

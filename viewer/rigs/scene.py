@@ -438,7 +438,10 @@ def scene_of(what: Scene | Actor, name: str) -> Scene:
     if isinstance(what, Scene):
         return what
     if not isinstance(what, Actor):
-        raise RigError(f"{name}: expected a scene or an actor, found {type(what).__name__}")
+        hints = {"Figure": "; viewer.Actor(figure) is one", "list": "; viewer.Scene(actors) is one"}
+        found = type(what).__name__
+        hint = hints.get(found, "")
+        raise RigError(f"{name}: expected a scene or an actor, found {found}{hint}")
     files = [origin.path for origin in what.figure.origins]
     files += [] if what.clip_origin is None else [what.clip_origin[0]]
     return Scene([what], files=files)

@@ -212,7 +212,8 @@ def test_widget_reads_back_what_the_page_has_chosen():
     widget.selection = "figure"
     assert widget.selection == ("figure",)
     widget["figure"][actor.figure.skeleton.names[1]] = [0.0, 0.5, 0.0]
-    assert_allclose(actor[actor.figure.skeleton.names[1]], [0.0, 0.5, 0.0], atol=1e-12)
+    for shown in (actor, widget["figure"]):
+        assert_allclose(shown[actor.figure.skeleton.names[1]], [0.0, 0.5, 0.0], atol=1e-12)
     rotations = np.frombuffer(widget._poses["0"]["values"]["rotations"])
     assert rotations.shape == (24,) and np.isfinite(rotations).all()
     data, _ = widget._repr_mimebundle_()
