@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, track_of, travelling_joints
@@ -53,14 +54,33 @@ _RARELY = 0.1  # fraction of these frames in which the feet of a body that glide
 _CARRIED = 0.2  # minimum length of this path, as a fraction of the figure's height
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Feet:
+    """The feet of a moving body, and the ground below them."""
+
+    subject: Subject
+    track: Track
+    heights: Floats
+    """(F, N): of each foot's lowest point above the ground, in scene units."""
+    height: float
+    """Of the figure."""
+    is_recorded: bool
+    """Whether the motion was captured, and not made with inverse kinematics."""
+
+    def label(self, foot: int) -> str:
+        """Return the name of a foot's joint."""
+        skeleton = self.subject.actor.figure.require_skeleton()
+        return joint_labels(skeleton)[int(self.track.feet[foot])]
+
+
 def check(subject: Subject) -> Iterator[Finding]:
     """Check the feet of a moving body: of two named ankles, or of a quadruped's legs."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
     if track is None or figure.skeleton is None or subject.options.ground == "none":
         return
-    feet = track.feet.tolist()
-    if len(feet) < 2:
+    n_feet = len(track.feet)
+    if n_feet < 2:
         return
     height, heights = extent(track.stance)[1], track.soles
     given = subject.options.ground
@@ -75,15 +95,12 @@ def check(subject: Subject) -> Iterator[Finding]:
             yield _unsure(subject, found, step)
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
-        yield from _sunk_throughout(subject, track, feet, ground, height)
-    labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
-    is_recorded = _is_recorded(subject, track)
-    yield from _sunk(
-        subject, track, feet, labels, heights - ground, sinks * height, height, is_recorded
-    )
-    if len(feet) == 2:  # animals also lie on the ground
-        yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
-    yield from _slipped(subject, track, feet, labels, heights - ground, height, is_recorded)
+        yield from _sunk_throughout(subject, track, ground, height)
+    feet = _Feet(subject, track, heights - ground, height, _is_recorded(subject, track))
+    yield from _sunk(feet, sinks * height)
+    if n_feet == 2:  # animals also lie on the ground
+        yield from _floating(feet, given == "auto")
+    yield from _slipped(feet)
 
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
@@ -135,18 +152,10 @@ def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
     )
 
 
-def _sunk(
-    subject: Subject,
-    track: Track,
-    feet: list[int],
-    labels: list[str],
-    heights: Floats,
-    limit: float,
-    height: float,
-    is_recorded: bool,
-) -> Iterator[Finding]:
+def _sunk(feet: _Feet, limit: float) -> Iterator[Finding]:
     """Report feet that sink deeper than a limit in figure units."""
-    depths = np.where(track.present[:, None], -heights, 0.0)
+    subject, track = feet.subject, feet.track
+    depths = np.where(track.present[:, None], -feet.heights, 0.0)
     deepest = depths.max(axis=1)
     is_deep = np.pad(deepest > limit * track.scale, 1)
     # A single frame may be noise, unless it is far too deep.
@@ -157,30 +166,31 @@ def _sunk(
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
     worst = int(depths[frames[0]].argmax())
     is_serious = (
-        is_recorded
-        or bool(deepest[frames[0]] > _DEEP * height * track.scale)
-        or _stands_sunk(track, depths, limit, height)
+        feet.is_recorded
+        or bool(deepest[frames[0]] > _DEEP * feet.height * track.scale)
+        or _stands_sunk(feet, depths, limit)
     )
     each = track.of_each(frames)
     yield subject.found(
         "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,
-        joint=labels[worst],
+        joint=feet.label(worst),
         depth=subject.length(float(deepest[frames[0]] / track.scale)),
         frame=int(track.numbers[frames[0]]),
         severity="warning" if is_serious else "note",
         part="clip",
-        joints=[feet[worst]],
+        joints=track.feet[[worst]],
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", int(frames[0])),
     )
 
 
-def _stands_sunk(track: Track, depths: Floats, limit: float, height: float) -> bool:
+def _stands_sunk(feet: _Feet, depths: Floats, limit: float) -> bool:
     """Return whether a foot rests below a limit for as long as feet stand."""
-    step, size = float(track.times[1] - track.times[0]), track.scale * height
+    track = feet.track
+    step, size = float(track.times[1] - track.times[0]), track.scale * feet.height
     for foot in depths.T:
         rests = resting_frames(-foot, track.present, step, size, limits.RESTS_FOR)
         if (rests & (foot > limit * track.scale)).sum() * step >= limits.RESTS_FOR:
@@ -189,7 +199,7 @@ def _stands_sunk(track: Track, depths: Floats, limit: float, height: float) -> b
 
 
 def _sunk_throughout(
-    subject: Subject, track: Track, feet: list[int], ground: float, height: float
+    subject: Subject, track: Track, ground: float, height: float
 ) -> Iterator[Finding]:
     """Report feet that stand below the ground in a whole motion, where the ground is known."""
     # A modelled character stands at rest on the floor of its animations, or they have it at 0. A
@@ -208,23 +218,17 @@ def _sunk_throughout(
         "C008.throughout: feet rest {depth} below the ground in the whole motion",
         depth=subject.length(depth / track.scale),
         part="clip",
-        joints=feet,
+        joints=track.feet,
         frames=track.numbers[:1],
         times=track.times[:1],
         at=("frames", 0),
     )
 
 
-def _floating(
-    subject: Subject,
-    track: Track,
-    feet: list[int],
-    heights: Floats,
-    height: float,
-    may_step: bool,
-) -> Iterator[Finding]:
+def _floating(feet: _Feet, may_step: bool) -> Iterator[Finding]:
     """Report a body whose lower foot rests above the ground; ``may_step``: by less than a step."""
-    lowest, size = heights.min(axis=1), track.scale * height
+    subject, track = feet.subject, feet.track
+    lowest, size = feet.heights.min(axis=1), track.scale * feet.height
     step = float(track.times[1] - track.times[0])
     rests = resting_frames(lowest, track.present, step, size, limits.RESTS_FOR)
     most = limits.STEPS * size if may_step else np.inf
@@ -240,23 +244,16 @@ def _floating(
         height=subject.length(float(lowest[frames[0]] / track.scale)),
         frame=int(track.numbers[frames[0]]),
         part="clip",
-        joints=feet,
+        joints=track.feet,
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", int(frames[0])),
     )
 
 
-def _slipped(
-    subject: Subject,
-    track: Track,
-    feet: list[int],
-    labels: list[str],
-    heights: Floats,
-    height: float,
-    is_recorded: bool,
-) -> Iterator[Finding]:
+def _slipped(feet: _Feet) -> Iterator[Finding]:
     """Report a foot that slides along the ground, where feet do not stand."""
+    subject, track = feet.subject, feet.track
     if track.body <= 0.0:  # legs without a length
         return
     step = float(track.times[1] - track.times[0])
@@ -272,17 +269,17 @@ def _slipped(
     for foot, contacts in enumerate(found):
         for contact in contacts:
             stands[contact.start : contact.stop, foot] = True
-    touches = (np.abs(heights) < limits.TOUCHES * track.body) & track.present[:, None]
+    touches = (np.abs(feet.heights) < limits.TOUCHES * track.body) & track.present[:, None]
     # Speeds are averaged over a window, so a foot must touch the ground in all of it.
     half, n_frames = half_window(1.0 / step) + 1, len(touches)
-    for foot in range(len(feet)):
+    for foot in range(len(paths)):
         for first, last in runs_of(touches[:, foot]):
             touches[first : first + half * (first > 0), foot] = False
             touches[max(last - half * (last < n_frames), 0) : last, foot] = False
     # Of the motion as it is: on moving ground, all that rests moves alike.
     body = track.positions[:, travelling_joints(track, subject.actor.figure.require_skeleton())[-1]]
     glides = np.all([_moves_with(path.heel, body) for path in track.paths], axis=0)
-    carried = np.repeat(glides[:, None], len(feet), axis=1)
+    carried = np.repeat(glides[:, None], len(paths), axis=1)
     if ground is not None:
         # Of a walk in place, the body moves less than half as fast as a foot that swings.
         across = along_ground(axis_vector(subject.up))
@@ -298,12 +295,12 @@ def _slipped(
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
     moves = np.zeros(3) if ground is None else ground.velocity
-    travels = _drifting(subject, track, feet, speeds / track.body, touches, height, moves)
+    travels = _drifting(feet, speeds / track.body, touches, moves)
     if not (distances > limits.FAR * track.body).any():
         yield from travels
         return
     worst = int(distances.argmax())
-    is_carried = is_recorded or _is_carried(track, worst, slides[:, worst], height)
+    is_carried = feet.is_recorded or _is_carried(feet, worst, slides[:, worst])
     if not is_carried:
         yield from travels
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
@@ -312,13 +309,13 @@ def _slipped(
         "C007.foot: {n}: {joint} slides by {distance} in total, at up to {speed} (frame {frame})",
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,
-        joint=labels[worst],
+        joint=feet.label(worst),
         distance=subject.length(float(distances[worst] / track.scale)),
         speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
         frame=int(track.numbers[fastest]),
         severity="warning" if is_carried else "note",
         part="clip",
-        joints=[feet[worst]],
+        joints=track.feet[[worst]],
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", fastest),
@@ -337,21 +334,14 @@ def _drifts(path: FootPath, contact: Contact, size: float, up: Floats) -> bool:
     return length > _GLIDES * size and float(hip @ way) > _ALONG * length**2
 
 
-def _drifting(
-    subject: Subject,
-    track: Track,
-    feet: list[int],
-    speeds: Floats,
-    touches: Bools,
-    height: float,
-    ground: Floats,
-) -> Iterator[Finding]:
+def _drifting(feet: _Feet, speeds: Floats, touches: Bools, ground: Floats) -> Iterator[Finding]:
     """Report a body that travels while its feet walk at another speed, or in place.
 
     ``ground``: (3,), its velocity below a body in place.
     """
     # A walker travels, and each foot stands for some time; or both feet pass the body on a ground
     # that moves. If the body travels although no foot ever stands, it glides.
+    subject, track = feet.subject, feet.track
     rows = np.flatnonzero(touches.any(axis=1))
     there = np.flatnonzero(track.present)
     seconds = float(track.times[there[-1]] - track.times[there[0]]) if len(there) else 0.0
@@ -366,7 +356,7 @@ def _drifting(
     # Ground that moves below a walker moves backwards. If it seems to move along with the body, so
     # do the feet that stand on it.
     is_along = float(ground @ travel) * seconds > _ALONG * distance**2
-    if distance < _CARRIED * height * track.scale:
+    if distance < _CARRIED * feet.height * track.scale:
         return
     if not is_along and not limits.FAST < speed < limits.SWINGS:
         return
@@ -374,22 +364,23 @@ def _drifting(
         "C007.travel: the body travels {distance}, but no foot ever stands",
         distance=subject.length(distance / track.scale),
         part="clip",
-        joints=feet,
+        joints=track.feet,
         frames=track.numbers[track.of_each(rows)],
         times=track.times[track.of_each(rows)],
         at=("frames", int(rows[0])),
     )
 
 
-def _is_carried(track: Track, foot: int, slides: Bools, height: float) -> bool:
+def _is_carried(feet: _Feet, foot: int, slides: Bools) -> bool:
     """Return whether the hip moves along with a foot while it slides: the body skates."""
     # Animators also shift a foot under a body that stays, and let feet of walks in place glide at
     # speeds that vary. Of the foot's path, only what the hip does in the same steps counts.
+    track = feet.track
     both, path = slides[1:] & slides[:-1], track.paths[foot]
     steps, hips = np.diff(path.heel, axis=0)[both], np.diff(path.hip, axis=0)[both]
     lengths = np.linalg.norm(steps, axis=1)
     carried = float((np.einsum("na,na->n", hips, steps) / np.maximum(lengths, 1e-30)).sum())
-    return carried > _ALONG * lengths.sum() and carried > _CARRIED * height * track.scale
+    return carried > _ALONG * lengths.sum() and carried > _CARRIED * feet.height * track.scale
 
 
 def _carried_slowly(track: Track, body: Floats, speeds: Floats, low: Bools, up: Floats) -> Bools:
