@@ -20,8 +20,9 @@ GROWS = channel(1, "scale", [0.0, 1.0], [[1.0, 1, 1], [2, 0.5, 1]])
 
 
 def written(animation, path, kind):
-    """Return the notes of an export by key."""
+    """Return the notes of an export by key; all of them can be shown."""
     notes = export_frames(animation, path, kind, ExportOptions())
+    assert all(str(note) for note in notes)
     return {note.key: note for note in notes}
 
 
@@ -62,6 +63,7 @@ def test_bvh_represents_scales_by_positions_and_reports_the_loss(tmp_path):
     found = written(animation, tmp_path / "leg.bvh", "bvh")
     lost = found["X003.bvh-joint-scales"].values
     assert (lost["low"], lost["high"]) == (0.5, 2.0)
+    assert "scales of joints (0.5 to 2)" in str(found["X003.bvh-joint-scales"])
     bvh = PlainBvh(tmp_path / "leg.bvh")
     places = world_frames(animation.figure, animation.frames)[..., :3, 3]
     for frame in (0, 12, 30):

@@ -196,8 +196,8 @@ def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
     notes += joint_scales_note(
         frames,
         figure.require_skeleton(),
-        "X003.clip-joint-scales: .anim cannot animate scales of joints ({low:g} to "
-        "{high:g}), which are omitted",
+        "X003.clip-joint-scales: .anim cannot animate scales of joints ({low} to {high}), "
+        "which are omitted",
     )
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:

@@ -358,7 +358,7 @@ def _remarks(writer: _Writer) -> list[Diagnostic]:
     notes += joint_scales_note(
         frames,
         animation.figure.require_skeleton(),
-        "X003.bvh-joint-scales: BVH cannot animate scales of joints ({low:g} to {high:g}): "
+        "X003.bvh-joint-scales: BVH cannot animate scales of joints ({low} to {high}): "
         "only the positions of joints follow them",
     )
     scales = frames.figure_scales[frames.present]
