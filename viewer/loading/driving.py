@@ -172,7 +172,7 @@ def _give_body_motion(
         carried = _carried(path, actor, up, choice.target, draft, settings)
         draft.add(carried, up[-1], placed=False)
         return
-    if driven and _drives_character(path, motion.name, actor, up, draft, settings):
+    if driven and _drives_character(path, actor, up, draft, settings):
         draft.diagnostics += notes
         return
     if body is not choice.figure:
@@ -242,10 +242,7 @@ def _carried(
     path: Path, actor: Actor, up: str, target: Figure, draft: SceneDraft, settings: MotionSettings
 ) -> Actor:
     """Return an actor of a figure with other joints that a body moves."""
-    assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
-    drive = body_drive(
-        actor.figure, actor.clip, up, settings.joint_map, settings.feet, settings.hand_contact
-    )
+    drive = _drive_by_body(actor, up, settings)
     try:
         clip, notes = driven_clip(drive, target)
     except RigError as problem:
@@ -254,19 +251,18 @@ def _carried(
     return Actor(target, clip=clip, placement=actor.placement, called=actor.called, drive=drive)
 
 
+def _drive_by_body(actor: Actor, up: str, settings: MotionSettings) -> Drive:
+    """Return the motion of a captured body as one that drives figures."""
+    assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
+    how = settings.joint_map, settings.feet, settings.hand_contact
+    return body_drive(actor.figure, actor.clip, up, *how)
+
+
 def _drives_character(
-    path: Path, name: str, actor: Actor, up: str, draft: SceneDraft, settings: MotionSettings
+    path: Path, actor: Actor, up: str, draft: SceneDraft, settings: MotionSettings
 ) -> bool:
     """Let a motion of the bundled body drive another figure that has its joints, if any."""
-    assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
-    body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
-    drive = Drive(
-        SkeletonMotion(body, actor.clip),
-        joint_map=settings.joint_map,
-        plants_feet=settings.feet,
-        keeps_hands=settings.hand_contact,
-        hangs=up.startswith("-"),
-    )
+    drive = replace(_drive_by_body(actor, up, settings), keeps_up=False)
     return drive_somebody(path, drive, draft, actor.placement)[0]
 
 
