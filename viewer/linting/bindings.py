@@ -11,7 +11,7 @@ from viewer.linting._subject import Indices, Subject
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.inspection.faults import are_usable, bind_faults
 from viewer.rigs.kinematics import world_matrices
@@ -110,10 +110,8 @@ def _angles_at_rest(skin: Skin, skeleton: Skeleton, used: Indices) -> Floats:
     """Return by how much joints (N,) rotate the mesh at rest, compared with most of them: (N,)."""
     worlds = world_matrices(skeleton, rest_pose(skeleton))[used]
     turns, _ = nearest_rotations((worlds @ skin.inverse_bind[used])[:, :3, :3])
-    # Angles between the rotations of all pairs, from trace(A^T B) = 1 + 2 cos; the pose of most
-    # joints is that of the mesh.
-    traces = np.einsum("iab,jab->ij", turns, turns)
-    angles: Floats = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    angles = angles_of_pairs(turns)
+    # The pose of most joints is that of the mesh.
     return angles[int((angles < _ASTRAY).sum(axis=1).argmax())]
 
 

@@ -11,7 +11,7 @@ from viewer.linting._finding import Finding
 from viewer.linting._mirror import name_partners
 from viewer.linting._subject import Subject
 from viewer.phrases import listed
-from viewer.rigs.geometry.rotation import nearest_rotations
+from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.skeleton import joint_labels
@@ -54,8 +54,7 @@ def _rebound(subject: Subject, finding: Finding) -> Diagnostic | None:
     others = np.setdiff1d(np.flatnonzero(moves_vertices(skin)), finding.joints)
     moves = worlds[others] @ skin.inverse_bind[others]
     turns, _ = nearest_rotations(moves[:, :3, :3])
-    traces = np.einsum("iab,jab->ij", turns, turns)
-    angles = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+    angles = angles_of_pairs(turns)
     usual = int((angles < _SAME).sum(axis=1).argmax())
     if (angles[usual] < _SAME).sum() < 0.5 * len(others):
         return None  # bound in another pose: the rotation at rest says nothing

@@ -169,6 +169,13 @@ def rotation_distance(first: Floats, second: Floats) -> Floats:
     return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))
 
 
+def angles_of_pairs(rotations: Floats) -> Floats:
+    """Return the angles between all pairs of rotations (N, 3, 3), radians: (N, N)."""
+    # trace(A^T B) = 1 + 2 cos t.
+    traces = np.einsum("iab,jab->ij", rotations, rotations)
+    return np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+
+
 def six_to_matrix(values: Floats) -> tuple[Floats, Floats]:
     """Return matrices (..., 3, 3) of two columns each (..., 6), and how far these span a plane.
 
