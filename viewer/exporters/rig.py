@@ -34,7 +34,7 @@ from viewer.rigs.hierarchy import depth_first
 from viewer.rigs.kinematics import joint_worlds, world_matrices
 from viewer.rigs.mesh import without_seams
 from viewer.rigs.motion.evaluation import still_frames
-from viewer.rigs.pose import Pose, rest_pose
+from viewer.rigs.pose import Pose, joint_offsets, rest_pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
@@ -331,13 +331,9 @@ def _scaled(skeleton: Skeleton, pose: Pose) -> tuple[Pose, Floats]:
     scaled = replace(pose.copy(), figure_scale=1.0, shape_weights=np.zeros(0))
     scaled.translations *= factor
     scaled.dofs[moves] *= factor
-    moved = scaled.translations.copy()
-    np.add.at(moved, (skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), scaled.dofs[moves])
     if skeleton.posing is not None:
-        own = skeleton.posing.translations(pose.dofs)
-        scaled.translations += (factor - 1.0) * own
-        moved += factor * own
-    return scaled, moved
+        scaled.translations += (factor - 1.0) * skeleton.posing.translations(pose.dofs)
+    return scaled, joint_offsets(skeleton, scaled.dofs, scaled.translations)
 
 
 def _plain_rows(skeleton: Skeleton, pose: Pose) -> tuple[Ints, Bools]:
