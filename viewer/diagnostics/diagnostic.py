@@ -135,9 +135,13 @@ class Diagnostic:
     @property
     def place(self) -> str:
         """``file:line`` or ``file#pointer``, or the known part of it."""
+        return self.placed()
+
+    def placed(self, longest: int = 300, is_short: bool = False) -> str:
+        """Return ``place``, of at most ``longest`` characters; short without the folder."""
         if self.path is None:
             return ""
-        path = printable(self.path, 300)
+        path = printable(self.path.name if is_short else self.path, longest)
         if self.pointer:
             return f"{path}#{printable(self.pointer, 120)}"
         return path if self.line is None else f"{path}:{self.line}"

@@ -12,7 +12,6 @@ import numpy as np
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.diagnostics.codes import Severity
-from viewer.phrases import printable
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.inspection.faults import NO_INDICES
 
@@ -143,9 +142,4 @@ class Finding:
 
     def place(self, longest: int = 300, is_short: bool = False) -> str:
         """Return ``file:line`` or ``file#pointer``, or what is known; short without the folder."""
-        if self.file is None or self.file == Path():
-            return ""
-        path = printable(self.file.name if is_short else self.file, longest)
-        if self.pointer:
-            return f"{path}#{printable(self.pointer, 120)}"
-        return path if self.line is None else f"{path}:{self.line}"
+        return "" if self.file == Path() else self.diagnostic.placed(longest, is_short)
