@@ -68,9 +68,16 @@ def split_paths(path: Path, count: int) -> list[Path]:
 
 def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     """Return the file of each frame; its number replaces ``{frame}`` in the name."""
-    files = [path.with_name(path.name.format(frame=int(frame))) for frame in frames]
-    if len(set(files)) < len(files):
-        raise OutputError(f"{printable(path, 300)}: expected a name with {{frame}}")
+    numbers = [int(frame) for frame in frames]
+    try:
+        files = [path.with_name(path.name.format(frame=number)) for number in numbers]
+    except (ValueError, KeyError, IndexError, AttributeError):
+        files = []
+    if len(set(files)) < len(numbers):
+        example = f"{printable(path.stem)}_{{frame:05}}{path.suffix}"
+        raise OutputError(
+            f"{printable(path, 300)}: expected a name with {{frame}}, as in {example}"
+        )
     return files
 
 

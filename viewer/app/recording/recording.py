@@ -37,7 +37,8 @@ from viewer.app.linting.marks import marks_of
 from viewer.app.weights.vertex_panel import vertex_annotation
 from viewer.app.weights.weights_panel import Weights
 from viewer.data_classes import dataclass, setting
-from viewer.errors import OutputError, ViewerError
+from viewer.errors import ViewerError
+from viewer.exporters._motion_paths import numbered_paths
 from viewer.formats import check_targets, file_stem
 from viewer.linting import Finding, places_of
 from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS, VIDEOS
@@ -490,7 +491,7 @@ def _recording_steps(
     )
     files = [path]
     if settings.kind == "pictures":
-        files = _numbered(path, recording.numbers)
+        files = numbered_paths(path, recording.numbers)
     # The dialog asks before replacing a single file, but not for numbered files.
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
@@ -511,19 +512,6 @@ def _recording_steps(
     notes = [*sink.notes, *renderer.notes]
     width, height = recording.size
     return [f"Saved {name}: {recording.n_frames} frames, {width} x {height}", *notes]
-
-
-def _numbered(path: Path, numbers: Sequence[int]) -> list[Path]:
-    try:
-        files = [path.with_name(path.name.format(frame=number)) for number in numbers]
-    except (ValueError, KeyError, IndexError, AttributeError):
-        files = []
-    if len(set(files)) < len(numbers):
-        raise OutputError(
-            f"{printable(path, 300)}: expected a name with {{frame}}, as in "
-            f"{printable(path.stem)}_{{frame:05}}.png"
-        )
-    return files
 
 
 def _sink(settings: RecordSettings, files: list[Path], recording: Recording) -> Sink:
