@@ -55,7 +55,11 @@ def levels(found: list[Finding]) -> list[tuple[str, str]]:
 def test_sliding_foot_of_a_capture_is_a_warning_and_that_of_controls_a_note():
     assert levels(moved({3: SHIFTED})) == [("C007", "warning")]
     assert levels(moved({3: SHIFTED}, ("arm.l", "arm.r"))) == [("C007", "warning")]
-    assert levels(moved({3: SHIFTED}, ("kneeIK.l", "kneeIK.r"))) == [("C007", "note")]
+    for names in (("kneeIK.l", "kneeIK.r"), ("PoleTarget.L", "PoleTarget.R")):
+        assert levels(moved({3: SHIFTED}, names)) == [("C007", "note")]
+    # Skeletons of games have these in captures, too.
+    names = ("ik_foot_root", "ik_foot_l", "ik_foot_r")
+    assert levels(moved({3: SHIFTED}, names)) == [("C007", "warning")]
 
 
 @pytest.mark.parametrize(("noise", "severity"), [(0.0, "note"), (0.002, "warning")])

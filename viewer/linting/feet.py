@@ -37,7 +37,9 @@ from viewer.rigs.skeleton import joint_labels
 # are frames that were baked from controls of inverse kinematics, which some BVH files have as
 # joints, or which hold the feet of a moving body exactly: standing feet of captures have a median
 # speed of 0.02 sizes per second.
-_CONTROLS = {"ik", "pole", "ctrl", "control"}
+# Captures of game skeletons have ik_foot and ik_hand, too, which follow feet and hands: what only
+# animators have is where knees and elbows point.
+_CONTROLS, _POLES = {"pole", "target", "ctrl", "control"}, {"knee", "elbow"}
 _EXACT, _MOVES = 0.003, 0.03  # sizes per second: of a held foot at most, of the hip at least
 _HELD = 0.5  # minimum fraction of the rows in which a foot stands while the body moves
 _ALONG = 0.5  # minimum ratio of the hip's path to that of a foot that skates
@@ -115,8 +117,8 @@ def _is_recorded(subject: Subject, track: Track) -> bool:
     """Return whether a motion was captured, and its feet were not held by inverse kinematics."""
     if subject.actor.captured is None or track.body <= 0.0:
         return subject.actor.captured is not None
-    names = subject.actor.figure.require_skeleton().names
-    if sum(not _CONTROLS.isdisjoint(name_tokens(name)) for name in names) > 1:
+    names = [set(name_tokens(name)) for name in subject.actor.figure.require_skeleton().names]
+    if sum(bool(name & _CONTROLS) or ("ik" in name and bool(name & _POLES)) for name in names) > 1:
         return False
     rate = 1.0 / float(track.times[1] - track.times[0])
     how = runs_of(track.present), rate, track.body, axis_vector(subject.up)
