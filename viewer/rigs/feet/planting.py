@@ -243,6 +243,9 @@ def _below_source(feet: Sequence[FootPath], body: BodyLegs, worlds: Floats, up: 
         return 0.0
     lows = np.min([foot.lowest(up) for foot in feet], axis=0), body.heights(worlds, up).min(axis=1)
     theirs, own = (float(np.percentile(each, _LOWEST_ROWS)) for each in lows)
+    # Their joints are above their soles, as for ``ground_level``.
+    low, high = limits.ON_GROUND
+    theirs = 0.0 if low * body.size < theirs < high * body.size else theirs
     return theirs - own if abs(theirs - own) > limits.LEVEL * body.size else 0.0
 
 
