@@ -75,10 +75,10 @@ def person(head=0.12, ears=False):
     return mesh(*parts)
 
 
-def with_staff():
-    """Return a person with a staff 1.15 long in the left hand."""
+def with_staff(low=0.6):
+    """Return a person with a staff in the left hand, 1.15 long if it begins at ``low``."""
     positions, triangles = person()
-    staff, more = mesh(ball_chain((0.7, 0.6, 0.03, 0.03), (0.7, 1.75, 0.03, 0.03)))
+    staff, more = mesh(ball_chain((0.7, low, 0.03, 0.03), (0.7, 1.75, 0.03, 0.03)))
     return np.concatenate([positions, staff]), np.concatenate([triangles, len(positions) + more])
 
 
@@ -128,6 +128,14 @@ def test_staff_in_one_hand_is_not_part_of_the_arm():
     # Rows 16 to 23 and 24 to 31 are the arms, from the tips: at x = 0.75 without the staff.
     for row, side in ((16, 1.0), (24, -1.0)):
         np.testing.assert_allclose(points[row], [side * 0.72, 1.0, 0.0], atol=0.08)
+
+
+def test_feet_stand_although_a_staff_reaches_deeper():
+    anatomy = anatomy_of(*with_staff(-0.4), UP, np.array([1.0, 0, 0]))
+    # The soles, at 0.04 less the radius of the feet; a voxel is 0.022 wide.
+    assert anatomy.ground == pytest.approx(-0.01, abs=0.025)
+    (plan,) = plans_of(anatomy, False, AHEAD)
+    assert anatomy.stands(plan.lower) and plan.lower.attachment[1] == pytest.approx(0.6, abs=0.1)
 
 
 def test_plane_between_front_and_back_is_not_the_only_one():

@@ -141,8 +141,10 @@ class Anatomy:
 
     @property
     def ground(self) -> float:
-        """Height of the lowest voxel."""
-        return float((self.solid.centers(self.solid.voxels) @ self.up).min())
+        """Height down to which both sides reach: a staff or a gun in one hand may reach deeper."""
+        centers = self.solid.centers(self.solid.voxels)
+        heights, sides = centers @ self.up, centers @ self.lateral - self.offset
+        return max(float(heights[side].min()) for side in (sides >= 0.0, sides <= 0.0))
 
     @property
     def height(self) -> float:
