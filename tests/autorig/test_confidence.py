@@ -241,8 +241,8 @@ def test_person_who_bows_fits_closely(person):
     assert "trunk" not in leaning(person, 60.0, gap=0.009)
 
 
-def raised(person, degrees, neck=0.0, lean=0.0):
-    """Return findings on a rig of the person with raised arms, horizontal at 0.
+def raised(person, degrees, neck=0.0, lean=0.0, key="head"):
+    """Return findings with a key on a rig of the person with raised arms, horizontal at 0.
 
     ``neck``: length of the neck relative to the person's. ``lean``: rotation of the root, degrees.
     """
@@ -259,7 +259,7 @@ def raised(person, degrees, neck=0.0, lean=0.0):
         rigged[f"{side}_shoulder"] = [0.0, 0.0, sign * (np.radians(degrees) - now)]
     rigged["pelvis"] = np.radians([lean, 0.0, 0.0])
     found = judge(figure, pose, rig, rigged, figure.mesh, alignment(0.02), (solid, solid))
-    return [each for each in found if each.sentence.startswith("R017.head")]
+    return [each for each in found if each.sentence.startswith(f"R017.{key}:")]
 
 
 def test_arms_above_a_head_between_the_shoulders_may_be_ears(person):
@@ -278,6 +278,17 @@ def test_arms_above_a_head_between_the_shoulders_may_be_ears(person):
     assert lying.value == pytest.approx(high.value, abs=1e-9)
     # A person may raise the arms.
     assert raised(person, 90.0, neck=1.0) == []
+
+
+def test_head_far_above_the_shoulders_is_that_of_another_figure(person):
+    usual, long, longest = (raised(person, 0.0, neck, key="neck")[0] for neck in (1.0, 3.0, 5.0))
+    # Neck and head are on a line upwards, nearly: the height grows with the neck's length.
+    assert longest.value - long.value == pytest.approx(long.value - usual.value, rel=1e-6)
+    assert 0.2 < usual.value < 0.4 and usual.rating == 1.0
+    assert longest.value > 1.25 and longest.rating == 0.0
+    # Also if the figure lies.
+    (lying,) = raised(person, 0.0, 5.0, lean=90.0, key="neck")
+    assert lying.value == pytest.approx(longest.value, abs=1e-9)
 
 
 def test_animal_with_a_low_head_is_no_person():

@@ -10,6 +10,7 @@ says little. A rig is right if the limbs of the template are where the target ha
 - the trunk is as upright as in the template, unless the surfaces agree closely: a bird with its
   wings for arms leans forward, a person whose rig is a fox's lies on the back;
 - arms are not above a head that is hardly above the shoulders: they may be the ears of a rabbit;
+- nor are shoulders near the hips, far below the head: they may be the corners of a coat;
 - bones have 0.3 to 4 times the length that they have in the template, relative to the other bones;
 - a test pose that bends all joints keeps the volume.
 
@@ -350,6 +351,15 @@ def _posture(
         points = 0.5 * (shoulders + hands), places[head], shoulders
         rises.append([float(point @ trunk_way) / length**2 for point in points])
     usual, own = (top - shoulder for _, top, shoulder in rises)
+    # People have 0.3, characters 0.1 to 0.7. Lowered sleeves that touch the trunk everywhere are no
+    # limbs; if arms are then made of what swings beside the hips, it is 1 or more.
+    neck = Finding(
+        "R017.neck: the head is {value:.1f} times the length of the trunk above the shoulders",
+        own,
+        wrong=1.25,
+        good=0.75,
+    )
+    found.append(neck)
     if own > _NECK * usual:
         return tuple(found)  # people may raise their arms
     # People with outstretched arms have about 0; a rabbit with its ears for arms has 0.2 to 0.3.
