@@ -313,7 +313,8 @@ def test_feet_of_a_lying_person_are_not_planted():
 def test_feet_that_never_stand_are_as_low_as_those_of_the_source(height):
     """Runs of games touch the ground for a frame: figures with other ankles floated or sank."""
     rotations, path = walk()
-    path += np.outer(np.arange(N_WALK), [0.0, 0.0, 10.0]) + [0.0, height, 0.0]  # 6 m/s
+    path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s
+    path[:, 1] += height
     motion = written(t_pose(), rotations, path, rate=RATE)
     # Without toes and a mesh, the ankles of the figure are its soles; they used to be as high as
     # those of the source. The soles of the source are level, so its balls are its lowest points.
