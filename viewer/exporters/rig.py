@@ -37,7 +37,7 @@ from viewer.rigs.motion.evaluation import still_frames
 from viewer.rigs.pose import Pose, joint_offsets, rest_pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped
-from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label, scaled_skeleton
 from viewer.rigs.skin import skin_rows
 from viewer.rigs.skinning import Skinning, deform, joint_matrices, skin_used
 
@@ -200,9 +200,7 @@ def scaled(figure: Figure, factor: float) -> Figure:
     if mesh is not None:
         mesh = replace(mesh, positions=mesh.positions * factor)
     if skeleton is not None:
-        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
-        moves = skeleton.rest_translations * factor
-        skeleton = replace(skeleton, rest_translations=moves, boxes=boxes)
+        skeleton = scaled_skeleton(skeleton, factor)
     if skin is not None:
         inverse_bind = skin.inverse_bind.copy()
         inverse_bind[:, :3, 3] *= factor

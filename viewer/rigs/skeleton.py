@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -154,6 +155,12 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
         rest_dofs=np.zeros(3 * count),
         dof_limits=np.tile([-np.inf, np.inf], (3 * count, 1)),
     )
+
+
+def scaled_skeleton(skeleton: Skeleton, factor: float) -> Skeleton:
+    """Return a skeleton with rest translations and boxes times a factor; its DOFs stay."""
+    boxes = None if skeleton.boxes is None else skeleton.boxes * factor
+    return replace(skeleton, rest_translations=skeleton.rest_translations * factor, boxes=boxes)
 
 
 def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:

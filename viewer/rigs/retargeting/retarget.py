@@ -41,7 +41,7 @@ from viewer.rigs.retargeting.rest_alignment import (
     rest_of,
 )
 from viewer.rigs.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
-from viewer.rigs.skeleton import Skeleton, joint_label, joint_labels
+from viewer.rigs.skeleton import Skeleton, joint_label, joint_labels, scaled_skeleton
 
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 _SIDES = ("left", "right")
@@ -141,11 +141,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     if not 0.0 < factor < np.inf:
         raise RigError(f"expected a factor above 0, found {factor:g}")
     figure, clip = motion.figure, motion.clip
-    skeleton = figure.skeleton
-    if skeleton is not None:
-        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
-        moved = skeleton.rest_translations * factor
-        skeleton = replace(skeleton, rest_translations=moved, boxes=boxes)
+    skeleton = None if figure.skeleton is None else scaled_skeleton(figure.skeleton, factor)
     shifts, place = clip.translations, clip.figure_translations
     return replace(
         motion,
