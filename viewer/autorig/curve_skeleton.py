@@ -45,7 +45,7 @@ from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed, rounded
 from viewer.progress import part_of_work, report_fraction
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import ball_skeleton
@@ -1107,7 +1107,7 @@ def _thin_parts(solid: Solid, parts: Parts, parents: Ints, joints: Floats) -> tu
     of_surface = labels[tuple(solid.voxels[parts.rows].T)]
     shares = np.bincount(of_surface, parts.areas, count + 1)[1:] / parts.areas.sum()
     found = np.flatnonzero(sticks_out & ~np.isin(numbers, own) & (shares >= _SEEN))
-    found = found[np.argsort(-shares[found], kind="stable")]
+    found = largest_first(found, shares)
     middles = ndimage.center_of_mass(labels > 0, labels, numbers[found])
     return shares[found], solid.centers(np.array(middles).reshape(-1, 3))
 

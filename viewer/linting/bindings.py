@@ -9,7 +9,7 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.geometry.vectors import unit
@@ -53,7 +53,7 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Find
     away = np.flatnonzero(distances > _ELSEWHERE * subject.size())
     if len(away) == 0:
         return
-    away = away[np.argsort(-distances[away], kind="stable")]
+    away = largest_first(away, distances)
     first = int(away[0])
     yield subject.found(
         "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
@@ -92,7 +92,7 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
     off = np.flatnonzero(angles > _ASTRAY)
     if len(off) == 0 or len(off) > _FEW * np.isfinite(angles).sum():
         return  # a note says that bind and rest pose differ
-    off = off[np.argsort(-angles[off], kind="stable")]
+    off = largest_first(off, angles)
     joints, labels = used[off], joint_labels(skeleton)
     yield subject.found(
         "B007.rotations: {n} bound with a rotation that differs from the rest pose: {names} "

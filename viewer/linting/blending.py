@@ -12,7 +12,7 @@ from viewer.linting._mirror import name_partners
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import FEWEST, Support, Surface, support_of, surface_of
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import edges_of, sides_of
 from viewer.rigs.mesh import Mesh
@@ -74,7 +74,7 @@ def _seams(subject: Subject, mesh: Mesh, skin: Skin, surface: Surface) -> Iterat
     torn = copies[(differences[copies] > _TORN) & ~rigid]
     if len(torn) == 0 or len(torn) > _ALL_TORN * len(copies):
         return
-    torn = torn[np.argsort(-differences[torn], kind="stable")]
+    torn = largest_first(torn, differences)
     first = int(torn[0])
     yield subject.found(
         "W014.seams: {n} weights that differ from those of a vertex at the same position, so the "

@@ -11,7 +11,7 @@ from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.linting.clips import missing_frames
 from viewer.phrases import all_of, counted, listed, rounded
-from viewer.rigs.arrays import Ints
+from viewer.rigs.arrays import Ints, largest_first
 from viewer.rigs.captures.points import PointClip, visible_size
 
 LOW_FRACTION = 0.05
@@ -57,7 +57,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> Iterator
     counts = is_low.sum(axis=0)
     fractions = counts / np.maximum(seen.sum(axis=0), 1)
     points = np.flatnonzero((fractions > LOW_FRACTION) & (counts >= LOW_FRAMES))
-    points = points[np.argsort(-fractions[points], kind="stable")]
+    points = largest_first(points, fractions)
     for point in points[:_SINGLE].tolist():
         frames = numbers[is_low[:, point]]
         yield subject.found(
@@ -113,7 +113,7 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> Iterator[Find
     wrong = np.flatnonzero(fastest > limit)
     if len(wrong) == 0:
         return
-    wrong = wrong[np.argsort(-fastest[wrong], kind="stable")]
+    wrong = largest_first(wrong, fastest)
     point = int(speeds[wrong[0]].argmax())
     frames = both[wrong]
     yield subject.found(

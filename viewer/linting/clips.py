@@ -21,7 +21,7 @@ from viewer.linting._subject import (
     travelling_joints,
 )
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.geometry.quaternion import angles_between
 from viewer.rigs.motion.clip import SHORTEST, Clip, evaluate_all
 from viewer.rigs.motion.timing import Timing
@@ -306,7 +306,7 @@ def _too_fast(track: Track, rates: Floats, limit: float) -> _TooFast | None:
     rows = np.flatnonzero(fastest > limit)
     if len(rows) == 0:
         return None
-    rows = rows[np.argsort(-fastest[rows], kind="stable")]
+    rows = largest_first(rows, fastest)
     rate = float(fastest[rows[0]])
     # Of joints with equal speed, up to rounding, the topmost in the hierarchy is reported.
     joint = int((rates[rows[0]] >= (1.0 - _ALIKE) * rate).argmax())

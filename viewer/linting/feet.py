@@ -11,7 +11,7 @@ from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, track_of, travelling_joints
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats, runs_of
+from viewer.rigs.arrays import Bools, Floats, largest_first, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.contacts import (
     Contact,
@@ -165,7 +165,7 @@ def _sunk(feet: _Feet, limit: float) -> Iterator[Finding]:
     frames = np.flatnonzero(lasts | (deepest > limits.FAR_TOO_DEEP * limit * track.scale))
     if len(frames) == 0:
         return
-    frames = frames[np.argsort(-deepest[frames], kind="stable")]
+    frames = largest_first(frames, deepest)
     worst = int(depths[frames[0]].argmax())
     is_serious = (
         feet.is_recorded
@@ -237,7 +237,7 @@ def _floating(feet: _Feet, may_step: bool) -> Iterator[Finding]:
     frames = np.flatnonzero(rests & (lowest > limits.FLOATS * size) & (lowest < most))
     if len(frames) == 0:
         return
-    frames = frames[np.argsort(-lowest[frames], kind="stable")]
+    frames = largest_first(frames, lowest)
     each = track.of_each(frames)
     yield subject.found(
         "C016.foot: {n}: both feet rest up to {height} above the ground, highest at frame {frame}",

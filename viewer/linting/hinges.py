@@ -10,6 +10,7 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, Track, ends_of, track_of, world_turns
 from viewer.phrases import counted
+from viewer.rigs.arrays import largest_first
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
@@ -76,7 +77,7 @@ def _hinge(
     wrong = np.flatnonzero((sides < _OPPOSITE * lengths) & (bends > _WRONG))
     if len(wrong) == 0 or len(wrong) > _RARELY * len(rows):
         return
-    wrong = wrong[np.argsort(-bends[wrong], kind="stable")]
+    wrong = largest_first(wrong, bends)
     each, first = track.of_each(rows[wrong]), int(rows[wrong[0]])
     yield subject.found(
         "C024.hinge: {n}: {joint} bends the wrong way by {angle:.0f}° at frame "

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject, track_of
 from viewer.phrases import counted, rounded
-from viewer.rigs.arrays import Bools, Floats, runs_of
+from viewer.rigs.arrays import Bools, Floats, largest_first, runs_of
 from viewer.rigs.captures.points import PointClip, visible_size
 from viewer.rigs.skeleton import joint_labels
 
@@ -92,10 +92,10 @@ def _rotations(subject: Subject) -> Iterator[Finding]:
     columns = columns[is_white]
     if len(columns) == 0:
         return
-    columns = columns[np.argsort(-most[columns], kind="stable")]
+    columns = largest_first(columns, most)
     highest = noise[:, columns].max(axis=1)
     frames = np.flatnonzero(highest > limit)
-    frames = rows[frames[np.argsort(-highest[frames], kind="stable")]]
+    frames = rows[largest_first(frames, highest)]
     yield subject.found(
         "C014.rotation: {n}: {joint} jitters by {noise} from frame to frame, most around frame "
         "{frame}; the median of all joints is {usual}",
@@ -170,7 +170,7 @@ def _found(
     frames = np.flatnonzero(highest > limit)
     if limit <= 0.0 or len(frames) == 0:
         return
-    frames = frames[np.argsort(-highest[frames], kind="stable")]
+    frames = largest_first(frames, highest)
     order = np.argsort(-noise.max(axis=0), kind="stable")
     joints = order[noise[:, order].max(axis=0) > limit]
     yield subject.found(

@@ -12,7 +12,7 @@ from viewer.linting._mirror import mirror_of
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import FEWEST, LEAST, Support, Surface, support_of, surface_of
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.memo import Memo
 from viewer.rigs.skeleton import joint_labels
@@ -89,7 +89,7 @@ def _peaks(subject: Subject, figure: Figure, found: Support, surface: Surface) -
     if len(joints) == 0 and (int(peaks.sum()) <= _NOISY * n_blends or n_blends < _FEWEST):
         return None
     rows = np.flatnonzero(peaks & np.isin(found.place_joints, joints) if len(joints) else peaks)
-    rows = rows[np.argsort(-outside[rows], kind="stable")]
+    rows = largest_first(rows, outside)
     first, labels = int(rows[0]), joint_labels(figure.require_skeleton())
     return subject.found(
         "W016.noise: {n} above or below those of all neighbours (worst: {weight} of {joint} at "
@@ -202,7 +202,7 @@ def _unequal(subject: Subject, figure: Figure, found: Support) -> Finding | None
         return None
     sizes = np.abs(sides.differences)
     rows = np.flatnonzero(np.isin(found.place_joints, joints) & (sizes > _UNEQUAL))
-    rows = rows[np.argsort(-sizes[rows], kind="stable")]
+    rows = largest_first(rows, sizes)
     labels = joint_labels(figure.require_skeleton())
     return subject.found(
         "W016.sides: weights of {n} differ between the sides without any pattern: {names} "

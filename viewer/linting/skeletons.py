@@ -11,7 +11,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import agree, counted, listed, quoted, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.inspection.faults import UNIT_ROTATION
 from viewer.rigs.pose import Pose
 from viewer.rigs.posing.dof_text import beyond_text
@@ -141,7 +141,7 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator
         beyond = np.maximum(low - pose.dofs, pose.dofs - high)
         outside = np.flatnonzero(beyond > _ROUNDING)
         if len(outside):
-            outside = outside[np.argsort(-beyond[outside], kind="stable")]
+            outside = largest_first(outside, beyond)
             worst = int(outside[0])
             yield subject.found(
                 "S004.pose: {n} of the pose {are} limits: {dof}",

@@ -11,7 +11,7 @@ from viewer.linting._mirror import Mirror, mirror_of
 from viewer.linting._subject import Subject
 from viewer.linting._surface import FEWEST, Surface, surface_of
 from viewer.phrases import counted
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.geometry.topology import Indices
 from viewer.rigs.geometry.vectors import reflected
 
@@ -41,7 +41,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     spikes = np.flatnonzero(tall & (heights > _HEIGHT * size))
     if len(spikes) == 0:
         return
-    spikes = spikes[np.argsort(-heights[spikes], kind="stable")]
+    spikes = largest_first(spikes, heights)
     first = int(spikes[0])
     yield subject.found(
         "M013.vertices: {n} out of the surface (worst: vertex {vertex}, {height} from the middle "

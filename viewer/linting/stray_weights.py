@@ -21,7 +21,7 @@ from viewer.linting._surface import (
     surface_of,
 )
 from viewer.phrases import agree, counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.topology import components
 from viewer.rigs.hierarchy import descendants, with_ancestors
@@ -310,7 +310,7 @@ def _islands(
 ) -> Iterator[Finding]:
     if len(rows) == 0:
         return
-    rows = rows[np.argsort(-distances[rows], kind="stable")]
+    rows = largest_first(rows, distances)
     vertices, first = found.vertices[rows], int(found.vertices[rows[0]])
     joints = distinct(found.joints[rows])
     yield subject.found(

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject, Track, track_of, travelling_joints
 from viewer.phrases import counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.skeleton import Skeleton, joint_labels
@@ -117,10 +117,10 @@ def _changed(
     columns = np.flatnonzero(most > np.log1p(least))
     if len(columns) == 0:
         return
-    columns = columns[np.argsort(-most[columns], kind="stable")]
+    columns = largest_first(columns, most)
     highest = logs[:, columns].max(axis=1)
     rows = np.flatnonzero(highest > np.log1p(least))
-    rows = rows[np.argsort(-highest[rows], kind="stable")]
+    rows = largest_first(rows, highest)
     each = track.of_each(rows)
     labels = joint_labels(subject.actor.figure.require_skeleton())
     yield subject.found(

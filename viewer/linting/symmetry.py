@@ -14,7 +14,7 @@ from viewer.linting._mirror import Mirror, mirror_of, name_partners
 from viewer.linting._subject import Subject
 from viewer.linting.noise import noisy_sides
 from viewer.phrases import agree, counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import reflected
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
@@ -92,7 +92,7 @@ def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> Iterator[Finding
     off = np.flatnonzero(distances > _MOVED * size)
     if len(off) == 0:
         return
-    off = off[np.argsort(-distances[off], kind="stable")]
+    off = largest_first(off, distances)
     worst = int(off[0])
     yield subject.found(
         "Y001.positions: {n} (worst: {distance} at vertex {vertex})",
@@ -117,7 +117,7 @@ def _weights(
     off = np.flatnonzero(differences > _SHIFTED)
     if len(off) == 0:
         return
-    off = off[np.argsort(-differences[off], kind="stable")]
+    off = largest_first(off, differences)
     worst = int(off[0])
     yield subject.found(
         "Y002.weights: weights of {n} differ from those of {their} (worst: total "
@@ -170,7 +170,7 @@ def _sides(subject: Subject, figure: Figure, mirror: Mirror) -> Iterator[Finding
         return
     joints = joints[np.argsort(-changed[joints] / total[joints], kind="stable")]
     moved = np.unique(vertices[counts & off[vertices] & np.isin(skin.joints, joints)])
-    moved = moved[np.argsort(-differences[moved], kind="stable")]
+    moved = largest_first(moved, differences)
     labels = joint_labels(skeleton)
     yield subject.found(
         "Y002.joints: weights of {n} differ from those at the mirrored positions, most for {names} "
@@ -223,7 +223,7 @@ def _joints(subject: Subject, figure: Figure, plane: _Plane) -> Iterator[Finding
     if len(off) > _FEW_OFF * pairs.sum():
         return  # the skeleton is in another pose than the mesh suggests
     # Of both joints, the one below a parent that is in its place is named.
-    off = off[np.argsort(-errors[off], kind="stable")]
+    off = largest_first(off, errors)
     labels = joint_labels(skeleton)
     yield subject.found(
         "Y003.joints: {n} not at the mirrored position of {their}: {names} (worst: {joint} by "

@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Subject
 from viewer.phrases import counted, listed, optional
-from viewer.rigs.arrays import Bools
+from viewer.rigs.arrays import Bools, largest_first
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.inspection.faults import are_singular, weight_faults
 from viewer.rigs.motion.evaluation import frames_of, pose_of
@@ -130,7 +130,7 @@ def _cost(
             limit=limit,
             left_out=left_out,
         ), crowded
-    known = known[np.argsort(-errors[known], kind="stable")]
+    known = largest_first(known, errors)
     cost = Phrase(
         "pruning to {limit} moves the mesh by up to {most} (vertex {vertex}), {mean} on "
         "average over these vertices, in {poses}{left_out}",

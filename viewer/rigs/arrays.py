@@ -35,6 +35,11 @@ def runs_of(flags: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
+def largest_first(rows: NDArray[Item], sizes: Floats) -> NDArray[Item]:
+    """Return rows in the order of their sizes (N,), the largest first; equal ones stay in order."""
+    return rows[np.argsort(-sizes[rows], kind="stable")]
+
+
 def blocks_of_rows(count: int, width: int) -> Iterator[slice]:
     """Yield slices of ``count`` rows, as many at a time as fit into a temporary array."""
     step = max(1, _MOST_NUMBERS // max(width, 1))

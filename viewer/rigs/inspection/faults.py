@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.phrases import agree, counted, listed, rounded
-from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh, bounding_box, typical_place
 from viewer.rigs.skeleton import joint_labels
@@ -100,7 +100,7 @@ def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
     errors = np.where(moved, np.abs(sums - 1.0), 0.0)
     off = np.flatnonzero(errors > _NOTED)
     if len(off):
-        off = off[np.argsort(-errors[off], kind="stable")]
+        off = largest_first(off, errors)
         worst = int(off[0])
         error = float(errors[worst])
         values = {
@@ -265,7 +265,7 @@ def stray_vertices(figure: Figure) -> Iterator[Fault]:
         return
     distances = np.abs(mesh.positions - center).max(axis=1)
     far = np.flatnonzero(distances > _FAR * typical)
-    far = far[np.argsort(-distances[far], kind="stable")]
+    far = largest_first(far, distances)
     first = int(far[0])
     values = {
         "n": counted(len(far), "stray vertex"),
