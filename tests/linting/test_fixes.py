@@ -21,6 +21,7 @@ from linting.test_bad_rigs import (
     taken,
     tube,
     turned,
+    turned_in_another_pose,
 )
 from linting.test_bad_rigs import weighted as shaped_by
 
@@ -168,6 +169,12 @@ def test_names_and_bindings_are_corrected():
     assert figure.skeleton.names == body().skeleton.names and "knee" in note
     figure, _ = fixed(turned(), bindings)
     np.testing.assert_allclose(figure.skin.inverse_bind, body().skin.inverse_bind, atol=1e-9)
+    # The shin is nearly perpendicular to z, about which its binding was rotated: the rest of that
+    # rotation, about the shin, is not seen.
+    figure, note = fixed(turned_in_another_pose(), bindings)
+    knee, was = (one.skin.inverse_bind[joint("left_knee"), :3, :3] for one in (figure, body()))
+    apart = np.degrees(np.arccos(0.5 * (np.trace(knee @ was.T) - 1.0)))
+    assert "bones bound in the direction at rest: left_knee" in note and apart < 3.0
 
 
 def test_spike_and_normal_are_corrected():

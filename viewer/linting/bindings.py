@@ -9,7 +9,7 @@ import numpy as np
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject
 from viewer.phrases import counted, listed
-from viewer.rigs.arrays import Bools, Floats, largest_first
+from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.geometry.vectors import unit
@@ -118,19 +118,26 @@ def _angles_at_rest(skin: Skin, skeleton: Skeleton, used: Indices) -> Floats:
 def _angles_to_children(skin: Skin, skeleton: Skeleton, used: Indices) -> Floats:
     """Return the angle of joints (N,) between their bones at rest and as bound; NaN without bones.
 
-    The position of a child, in the space of its parent, does not depend on the pose. Of several
-    children, that with the smallest angle counts: one may have been moved.
+    Of several children, that with the smallest angle counts: one may have been moved.
     """
     smallest = np.full(skeleton.n_joints, np.inf)
-    below = used[skeleton.parents[used] >= 0]
-    above = skeleton.parents[below]
-    places = bind_positions(skin)[below]
-    matrices = skin.inverse_bind[above]
-    bound = np.einsum("nab,nb->na", matrices[:, :3, :3], places) + matrices[:, :3, 3]
-    rest = skeleton.rest_translations[below]
-    cosines = np.einsum("na,na->n", unit(bound), unit(rest))
-    apart = np.linalg.norm(rest, axis=1) > _SHORT * np.abs(skeleton.rest_translations).max()
-    angles = np.where(apart, np.arccos(np.clip(cosines, -1.0, 1.0)), np.inf)
-    np.minimum.at(smallest, above, angles)
+    above, rest, bound = bone_directions(skin, skeleton, used)
+    cosines = np.einsum("na,na->n", bound, rest)
+    np.minimum.at(smallest, above, np.arccos(np.clip(cosines, -1.0, 1.0)))
     result = smallest[used]
     return np.where(np.isfinite(result), result, np.nan)
+
+
+def bone_directions(skin: Skin, skeleton: Skeleton, below: Indices) -> tuple[Ints, Floats, Floats]:
+    """Return parents (N,) of joints, and the unit vectors to these at rest and as bound: (N, 3).
+
+    The position of a child, in the space of its parent, does not depend on the pose. Joints at
+    their parents are left out.
+    """
+    rest = np.linalg.norm(skeleton.rest_translations[below], axis=1)
+    apart = rest > _SHORT * np.abs(skeleton.rest_translations).max()
+    below = below[(skeleton.parents[below] >= 0) & apart]
+    above = skeleton.parents[below]
+    matrices = skin.inverse_bind[above]
+    bound = np.einsum("nab,nb->na", matrices[:, :3, :3], bind_positions(skin)[below])
+    return above, unit(skeleton.rest_translations[below]), unit(bound + matrices[:, :3, 3])

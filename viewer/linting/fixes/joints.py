@@ -10,6 +10,7 @@ from viewer.diagnostics import Diagnostic, note
 from viewer.linting._finding import Finding
 from viewer.linting._mirror import name_partners
 from viewer.linting._subject import Subject
+from viewer.linting.bindings import bone_directions
 from viewer.phrases import listed
 from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.kinematics import world_matrices
@@ -18,6 +19,7 @@ from viewer.rigs.skeleton import joint_labels
 from viewer.rigs.skin import moves_vertices
 
 _SAME = np.radians(1.0)  # rotations that are equal up to rounding
+_LITTLE = 1e-6
 
 
 def fix(subject: Subject, finding: Finding) -> Diagnostic | None:
@@ -56,15 +58,25 @@ def _rebound(subject: Subject, finding: Finding) -> Diagnostic | None:
     turns, _ = nearest_rotations(moves[:, :3, :3])
     angles = angles_of_pairs(turns)
     usual = int((angles < _SAME).sum(axis=1).argmax())
-    if (angles[usual] < _SAME).sum() < 0.5 * len(others):
-        return None  # bound in another pose: the rotation at rest says nothing
-    joints = finding.joints
-    binds = skin.inverse_bind.copy()
-    binds[joints] = np.linalg.inv(worlds[joints]) @ moves[usual]
+    joints, binds = finding.joints, skin.inverse_bind.copy()
+    if (angles[usual] < _SAME).sum() >= 0.5 * len(others):
+        binds[joints] = np.linalg.inv(worlds[joints]) @ moves[usual]
+        said = "X007.bindings: {figure}: B007 fixed: bound at rest: {names}"
+    else:  # bound in another pose: bones still leave their joints in the direction at rest
+        used = np.flatnonzero(moves_vertices(skin))
+        above, rest, bound = bone_directions(skin, skeleton, used)
+        for joint in joints.tolist():
+            own = above == joint
+            # The little identity chooses the smallest of the rotations about a single bone.
+            turn, _ = nearest_rotations(rest[own].T @ bound[own] + _LITTLE * np.eye(3))
+            binds[joint, :3] = turn @ binds[joint, :3]
+        said = "X007.bones: {figure}: B007 fixed: bones bound in the direction at rest: {names}"
+    if np.abs(binds - skin.inverse_bind).max() < _LITTLE:
+        return None
     subject.actor.figure = replace(figure, skin=replace(skin, inverse_bind=binds))
     labels = joint_labels(skeleton)
     return note(
-        "X007.bindings: {figure}: B007 fixed: bound at rest: {names}",
+        said,
         figure=subject.actor.name,
         names=listed([labels[joint] for joint in joints]),
     )
