@@ -17,9 +17,10 @@ from viewer.exporters._motion_paths import files_at, is_together, part_files, pa
 from viewer.exporters._options import ExportOptions, PageOptions, VrmMeta
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
-from viewer.phrases import all_of, counted, printable
+from viewer.phrases import all_of, counted, listed, printable
 from viewer.plugins import plugin_of, plugins_of
 from viewer.rigs.bodies.smpl_family import member_of
+from viewer.rigs.captures.cameras import CameraView
 from viewer.rigs.captures.person import is_tracked, person_label
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.sampled_animation import sample_upright_points, upright_animation
@@ -114,6 +115,7 @@ EXPORTERS = {
         "joint limits, pose correctives",
         _BOTH | {"clips"},
         stores_many=True,
+        stores_cameras=True,
         options=frozenset({"optimizes"}),
         written={".gltf": ("", ".bin")},
     ),
@@ -414,6 +416,8 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
     omitted += [
         note(lacking, figure=part.actor.name) for part in selection.parts if part not in able
     ]
+    if scene is not None and scene.views and not kind.stores_cameras:
+        omitted.append(_cameras_note(scene.views))
     if is_together(kind, path, options):
         parts = [part if scene is None else _placed(scene, part) for part in there]
         return _Plan(key, [(Selection(parts, scene), path)], omitted)
@@ -453,6 +457,14 @@ def _absent_note(part: Part) -> Diagnostic:
         "X003.absent: {figure}: absent in {frames}, not written",
         figure=part.frames.name,
         frames=_span(part),
+    )
+
+
+def _cameras_note(views: Sequence[CameraView]) -> Diagnostic:
+    return note(
+        "X003.cameras: {n} not written: {names}",
+        names=listed([view.name for view in views], 8),
+        n=counted(len(views), "camera", "is", "are"),
     )
 
 

@@ -45,6 +45,8 @@ class Exporter:
     """What its files can contain of an actor."""
     stores_many: bool = False
     """Whether a file can contain several actors."""
+    stores_cameras: bool = False
+    """Whether a file can contain the cameras of the scene."""
     needs: Literal["mesh", "skeleton", ""] = ""
     """The part without which nothing of a figure can be written."""
     joints: Literal["course", "human", "smpl", ""] = ""

@@ -116,6 +116,9 @@ def test_cameras_are_read_back(tmp_path):
     assert front.name == "front"
     assert_allclose(front.rotation, turn, atol=1e-12)
     assert_allclose(front.translation, view.translation, atol=1e-12)
+    selection = Selection([Part(Actor(two_parts()))], Scene([], views=(view, lens)))
+    texts = [str(note) for note in export(selection, tmp_path / "seen.obj")]
+    assert "2 cameras are not written: front, lens" in texts
 
 
 def test_animations_without_effect_are_reported(tmp_path):
