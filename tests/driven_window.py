@@ -11,6 +11,16 @@ from children import listening
 from PIL import ImageGrab
 
 ROOT = Path(__file__).resolve().parents[1]
+PROGRAM = "import sys; from viewer.__main__ import main; sys.exit(main())"
+# These import nearly all that a window needs.
+IMPORTED = (
+    "PIL.Image",
+    "viewer.app.opening",
+    "viewer.app.window",
+    "viewer.commands.view",
+    "viewer.formats.skel",
+    "viewer.formats.skin",
+)
 PATIENCE = 60.0  # timeout of an expected event in seconds
 # A threshold of processor time in milliseconds. A frame drawn in software takes several times
 # longer; waking up to check the clock takes a tenth of it.
@@ -60,7 +70,7 @@ def _ask_to_close(display, window):
 class Window:
     """A running viewer, its window, mouse and keyboard."""
 
-    def __init__(self, display, folder, arguments, program=("-m", "viewer")):
+    def __init__(self, display, folder, arguments, forker=None, program=PROGRAM):
         self.display, self.folder = display, folder
         self.environment = {
             **os.environ,
@@ -71,10 +81,13 @@ class Window:
             "PYTHONWARNINGS": "error",
         }
         self.environment.pop("WAYLAND_DISPLAY", None)
-        self.process = subprocess.Popen(
-            listening(*program, *arguments),
-            cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
+        if forker is None:
+            self.process = subprocess.Popen(
+                listening("-m", "viewer", *arguments),
+                cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            )  # fmt: skip
+        else:
+            self.process = forker.start(program, arguments, folder, self.environment)
         self.id = _wait_for(self._find, "the window")
         self.tell("windowfocus", "--sync", self.id)
         self.wait_until_quiet()

@@ -7,9 +7,13 @@ does: exit functions run, and the interpreter is shut down.
 import gc
 import json
 import os
+import select
+import signal
 import socket
+import struct
 import subprocess
 import sys
+import time
 from importlib import import_module
 from pathlib import Path
 
@@ -17,7 +21,7 @@ from children import listening
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 100.0  # timeout of a program in seconds
-# All modules that a run imports after its first one.
+# All modules that a command imports after its first one.
 IMPORTED = (
     "numpy",
     "moderngl",
@@ -44,34 +48,77 @@ IMPORTED = (
 )
 
 
-class Forker:
-    """The process that is forked; it has no threads and no OpenGL context."""
+class Forked:
+    """A forked program, as far as tests need it like one of ``subprocess``."""
 
-    def __init__(self) -> None:
+    def __init__(self, connection: socket.socket, failed, streams: list[int]) -> None:
+        self._connection, self._failed, self._streams = connection, failed, streams
+        self._output: list[bytes] = []
+        self.returncode: int | None = None
+        self.pid = self._number()
+
+    def _number(self) -> int:
+        return struct.unpack("i", self._connection.recv(4, socket.MSG_WAITALL) or self._failed())[0]
+
+    def poll(self) -> int | None:
+        if self.returncode is None and select.select([self._connection], [], [], 0.0)[0]:
+            self.returncode = self._number()
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+    def communicate(self, timeout: float = PATIENCE) -> tuple[bytes, ...]:
+        """Return what the program has written until its end; too short to fill a pipe."""
+        end = time.monotonic() + timeout
+        while self._streams:
+            parts = []
+            while not parts or parts[-1]:
+                left = max(end - time.monotonic(), 0.0)
+                if not select.select([self._streams[0]], [], [], left)[0]:
+                    raise TimeoutError(f"the program runs for longer than {timeout:g} s")
+                parts.append(os.read(self._streams[0], 1 << 16))
+            os.close(self._streams.pop(0))
+            self._output.append(b"".join(parts))
+        if self.returncode is None:
+            self.returncode = self._number()
+        return tuple(self._output)
+
+
+class Forker:
+    """The process that is forked, for one program at a time; it has no threads and no OpenGL."""
+
+    def __init__(self, modules=IMPORTED, **environment: str) -> None:
         self._connection, other = socket.socketpair()
         self._connection.settimeout(PATIENCE)
         with other:
             self._process = subprocess.Popen(
-                listening(__file__, other.fileno()),
-                env={**os.environ, "PYTHONPATH": str(ROOT)},
+                listening(__file__, other.fileno(), *modules),
+                env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
                 pass_fds=[other.fileno()], stdin=subprocess.DEVNULL,
                 # These are pipes because forked programs replace them with their own pipes.
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             )  # fmt: skip
 
-    def run(self, program, arguments, folder) -> subprocess.CompletedProcess:
-        """Run a program like ``python -c``, its output captured."""
-        request = json.dumps([program, *map(str, arguments), str(folder)]).encode()
+    def start(self, program, arguments, folder, environment=None) -> Forked:
+        """Start a program like ``python -c``, its output captured."""
+        place = [dict(environment or os.environ), str(folder)]
+        request = json.dumps([place, program, *map(str, arguments)]).encode()
         pipes = [os.pipe() for _ in range(2)]
         socket.send_fds(self._connection, [request], [writing for _, writing in pipes])
         for _, writing in pipes:
             os.close(writing)
-        streams = []
-        for reading, _ in pipes:  # too short to fill a pipe
-            with os.fdopen(reading, "rb") as stream:
-                streams.append(stream.read())
-        code = int(self._connection.recv(16) or self._failed())
-        return subprocess.CompletedProcess(arguments, code, *streams)
+        return Forked(self._connection, self._failed, [reading for reading, _ in pipes])
+
+    def run(self, program, arguments, folder) -> subprocess.CompletedProcess:
+        """Run a program to its end."""
+        started = self.start(program, arguments, folder)
+        streams = started.communicate()
+        return subprocess.CompletedProcess(arguments, started.returncode, *streams)
 
     def _failed(self):
         raise RuntimeError(self._process.communicate(timeout=PATIENCE)[1].decode())
@@ -81,11 +128,12 @@ class Forker:
         assert self._process.communicate(timeout=PATIENCE) == (b"", b"")
 
 
-def serve(connection: socket.socket) -> tuple[list[str], list[int]]:
+def serve(connection: socket.socket) -> tuple[list, list[int]]:
     """Fork for each request; return in the forked process, with the request and its streams."""
     while True:
-        request, streams, *_ = socket.recv_fds(connection, 1 << 16, 2)
+        request, streams, *_ = socket.recv_fds(connection, 1 << 20, 2)
         if not request:
+            connection.close()
             sys.exit()
         pid = os.fork()
         if not pid:
@@ -93,15 +141,19 @@ def serve(connection: socket.socket) -> tuple[list[str], list[int]]:
             return json.loads(request), streams
         for stream in streams:
             os.close(stream)
+        connection.sendall(struct.pack("i", pid))
         _, status = os.waitpid(pid, 0)
-        connection.sendall(b"%d" % os.waitstatus_to_exitcode(status))
+        connection.sendall(struct.pack("i", os.waitstatus_to_exitcode(status)))
 
 
 if __name__ == "__main__":
-    for module in IMPORTED:
+    for module in sys.argv[2:]:
         import_module(module)
     gc.freeze()
-    (source, *given, place), (out, err) = serve(socket.socket(fileno=int(sys.argv[1])))
+    request, (out, err) = serve(socket.socket(fileno=int(sys.argv[1])))
+    (environment, place), source, *given = request
+    os.environ.clear()
+    os.environ.update(environment)
     for handle, copy in ((out, 1), (err, 2)):
         os.dup2(handle, copy)
         os.close(handle)
