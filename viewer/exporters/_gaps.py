@@ -79,6 +79,13 @@ def check_gaps(gaps: str) -> None:
         raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
 
 
+def file_spans(present: Bools, closing: GapHandling) -> list[tuple[int, int]]:
+    """Return the frames of each file as half-open ranges: several if gaps split the motion."""
+    if closing != "split" or present.all():
+        return [(0, len(present))]
+    return runs_of(present)
+
+
 def filled(frames: Frames, interpolate: bool) -> Frames:
     """Return frames whose gaps are interpolated, or hold the frame before; ends are held."""
     if frames.present.all():

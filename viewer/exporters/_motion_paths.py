@@ -9,9 +9,9 @@ import numpy as np
 
 from viewer.errors import OutputError
 from viewer.exporters._exporter import Exporter, Part
+from viewer.exporters._gaps import file_spans
 from viewer.exporters._options import ExportOptions
 from viewer.phrases import printable
-from viewer.rigs.arrays import runs_of
 from viewer.rigs.captures.person import person_name
 from viewer.rigs.scene import Actor
 
@@ -90,6 +90,6 @@ def part_files(kind: Exporter, part: Part, path: Path, options: ExportOptions) -
             path, first + (np.arange(len(present)) if is_whole else np.flatnonzero(present))
         )
     paths = [path]
-    if part.content == "frames" and not kind.keeps_gaps and options.closing == "split":
-        paths = split_paths(path, len(runs_of(part.present)))
+    if part.content == "frames" and not kind.keeps_gaps:
+        paths = split_paths(path, len(file_spans(part.present, options.closing)))
     return [file for each in paths for file in files_at(kind, each)]

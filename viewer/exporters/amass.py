@@ -27,14 +27,14 @@ from viewer.exporters._family import (
     read_frames,
     up_axis,
 )
-from viewer.exporters._gaps import check_gaps, filled, gaps_note
+from viewer.exporters._gaps import check_gaps, file_spans, filled, gaps_note
 from viewer.exporters._losses.motion_errors import frames_losses, resampling_losses
 from viewer.exporters._motion_paths import split_paths
 from viewer.exporters._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
-from viewer.rigs.arrays import Arrays, runs_of
+from viewer.rigs.arrays import Arrays
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import SignedUp
 from viewer.rigs.motion.sampled_animation import SampledAnimation
@@ -82,7 +82,7 @@ def write_layout(
     model = title if title == "SMPL-X" else member.title
     body, notes = family_frames(animation, frames, member, options, model)
     is_split = options.closing == "split" and not present.all()
-    spans = runs_of(present) if is_split else [(0, len(present))]
+    spans = file_spans(present, options.closing)
     paths = split_paths(path, len(spans))
     up = up_axis(options)
     written = []

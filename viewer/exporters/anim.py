@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._exporter import Selection
-from viewer.exporters._gaps import check_gaps, filled, gaps_note
+from viewer.exporters._gaps import check_gaps, file_spans, filled, gaps_note
 from viewer.exporters._left_out import joint_scales_note
 from viewer.exporters._losses.motion_errors import between_losses, frames_losses
 from viewer.exporters._motion_paths import split_paths
@@ -18,7 +18,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.phrases import counted, optional
-from viewer.rigs.arrays import Floats, runs_of
+from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.motion.clip import Clip, Tangent, evaluate_all, is_course_rig
@@ -92,9 +92,8 @@ def _export_frames(
         dofs[:, targets] = values
     dofs = np.clip(dofs, *skeleton.dof_limits.T)
     dofs[:, :3] += whole.figure_translations / whole.figure_scales[:, None]
-    is_split = options.closing == "split" and not frames.present.all()
-    spans = runs_of(frames.present) if is_split else [(0, frames.n_frames)]
     clips, rules = [], []
+    spans = file_spans(frames.present, options.closing)
     for start, stop in spans:
         part = slice(start, stop)
         trials = [

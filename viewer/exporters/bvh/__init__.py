@@ -12,7 +12,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.exporters._exporter import SampledParts, Selection
-from viewer.exporters._gaps import filled, frames_phrase, gaps_note
+from viewer.exporters._gaps import file_spans, filled, frames_phrase, gaps_note
 from viewer.exporters._left_out import joint_scales_note
 from viewer.exporters._losses.motion_errors import resampling_losses, shape_changes
 from viewer.exporters._motion_paths import split_paths
@@ -24,7 +24,7 @@ from viewer.formats import all_or_none, save_parts
 from viewer.formats.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
-from viewer.rigs.arrays import Floats, Ints, runs_of
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import up_rotation
 from viewer.rigs.geometry.vectors import axis_vector
@@ -73,9 +73,8 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     motion = given if isinstance(given, SampledParts) else _parts_of(selection.part.animation)
     writer = _Writer(motion, options)
     first, present = writer.first, writer.first.frames.present
-    spans = [(0, motion.n_frames)]
-    if options.closing == "split" and not present.all():
-        spans = runs_of(present)
+    # Only a motion in one part has gaps.
+    spans = [(0, motion.n_frames)] if present.all() else file_spans(present, options.closing)
     paths = split_paths(path, len(spans))
     n_there = [motion.n_frames if present.all() else int(present[slice(*s)].sum()) for s in spans]
     files = [_File(writer, *each) for each in zip(paths, spans, n_there, strict=True)]

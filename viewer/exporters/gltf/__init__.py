@@ -16,7 +16,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.exporters._exporter import Part, Selection
-from viewer.exporters._gaps import frames_phrase
+from viewer.exporters._gaps import file_spans, frames_phrase
 from viewer.exporters._left_out import motion_notes, of_figure, other_animations_note, rate_note
 from viewer.exporters._losses.motion_errors import resampling_losses
 from viewer.exporters._motion_paths import split_paths
@@ -39,7 +39,7 @@ from viewer.exporters.gltf.sampled import (
 )
 from viewer.formats import all_or_none, save_bytes
 from viewer.phrases import agree, all_of, counted, file_size, listed, optional, rounded
-from viewer.rigs.arrays import Floats, runs_of
+from viewer.rigs.arrays import Floats
 from viewer.rigs.captures.cameras import CameraPath, CameraView
 from viewer.rigs.captures.carried_view import carrier_of, moving_alone, played_with, view_in
 from viewer.rigs.figure import Figure
@@ -150,9 +150,7 @@ def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagno
     """Write a figure at rest and its frames; gaps may be filled, or split into several files."""
     animation = part.animation
     sampled = sampled_of(animation, options)
-    present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
-    if options.closing == "split" and not present.all():
-        spans = runs_of(present)
+    spans = file_spans(animation.frames.present, options.closing)
     paths = split_paths(path, len(spans))
     documents, built = [], []
     for span in spans:
