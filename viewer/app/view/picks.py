@@ -64,8 +64,7 @@ def _take_click(
         return
     pick = _pick(state, renderer, size, pixel, state.options)
     if not aims and (pick is None or pick.joint < 0):
-        x, y, width, _ = state.view_rect
-        near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
+        near = _joint_beside(state, size, pixel)
         if near >= 0:  # a joint is close to the click
             select_joint(state, near)
             return
@@ -101,14 +100,19 @@ def spot_at(
     """Return the item at a pixel, None for the background; may raise ``ViewerError`` for shapes."""
     pick = _pick(state, renderer, size, pixel, state.options)
     found = vertex_at(state, renderer, size, pixel)
-    x, y, width, _ = state.view_rect
-    near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
+    near = _joint_beside(state, size, pixel)
     if pick is None or (pick.joint < 0 and near >= 0):
         return Spot(state.chosen_actor, near, -1) if near >= 0 else None
     mover = _mover(state, pick) if pick.joint < 0 else None
     joint = pick.joint if mover is None else mover.joint
     vertex = found[1] if found and found[0] == pick.actor else -1
     return Spot(pick.actor, joint, vertex, _part_of(state, pick))
+
+
+def _joint_beside(state: AppState, size: tuple[int, int], pixel: tuple[float, float]) -> int:
+    """Return the joint drawn near a pixel of the image, -1 for none."""
+    x, y, width, _ = state.view_rect
+    return joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
 
 
 def _part_of(state: AppState, pick: Pick) -> int:
