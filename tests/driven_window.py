@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from children import listening
+from forked_programs import VIEWER
 from PIL import ImageGrab
 
 ROOT = Path(__file__).resolve().parents[1]
-PROGRAM = "import sys; from viewer.__main__ import main; sys.exit(main())"
 # These import nearly all that a window needs.
 IMPORTED = (
     "PIL.Image",
@@ -70,7 +70,7 @@ def _ask_to_close(display, window):
 class Window:
     """A running viewer, its window, mouse and keyboard."""
 
-    def __init__(self, display, folder, arguments, forker=None, program=PROGRAM):
+    def __init__(self, display, folder, arguments, forker=None, program=VIEWER):
         self.display, self.folder = display, folder
         self.environment = {
             **os.environ,

@@ -20,6 +20,7 @@ from pathlib import Path
 from children import listening
 
 ROOT = Path(__file__).resolve().parents[1]
+VIEWER = "import sys; from viewer.__main__ import main; sys.exit(main())"
 PATIENCE = 100.0  # timeout of a program in seconds
 # All modules that a command imports after its first one.
 IMPORTED = (
@@ -114,9 +115,9 @@ class Forker:
             os.close(writing)
         return Forked(self._connection, self._failed, [reading for reading, _ in pipes])
 
-    def run(self, program, arguments, folder) -> subprocess.CompletedProcess:
+    def run(self, program, arguments, folder, environment=None) -> subprocess.CompletedProcess:
         """Run a program to its end."""
-        started = self.start(program, arguments, folder)
+        started = self.start(program, arguments, folder, environment)
         streams = started.communicate()
         return subprocess.CompletedProcess(arguments, started.returncode, *streams)
 

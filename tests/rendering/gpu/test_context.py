@@ -1,7 +1,6 @@
 """Machines without usable OpenGL, simulated by environment variables, and their messages."""
 
 import os
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from forked_programs import VIEWER, Forker
 
 import viewer
 from viewer.cli import run
@@ -48,23 +48,33 @@ TINY_SKEL = """balljoint root {
 """
 
 
-def viewer_render(tmp_path, *arguments: str, **environment: str):
-    """Run ``viewer render`` on one joint in a new process; return it and the path of the image."""
-    skel, output = tmp_path / "one.skel", tmp_path / "one.png"
-    skel.write_text(TINY_SKEL)
-    command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
-    size = [] if "--size" in arguments else ["--size", "64x48"]
-    size += [] if "--quality" in arguments else ["--quality", "draft"]
-    result = subprocess.run(
-        [*command, *size, *arguments],
-        cwd=ROOT,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    return result, output
+@pytest.fixture(scope="module")
+def program():
+    """A function that runs the viewer, forked from a process that has imported it."""
+    forker = Forker()
+
+    def run_viewer(*arguments: str, **environment: str):
+        result = forker.run(VIEWER, arguments, ROOT, {**os.environ, **environment})
+        result.stdout, result.stderr = result.stdout.decode(), result.stderr.decode()
+        return result
+
+    yield run_viewer
+    forker.close()
+
+
+@pytest.fixture
+def viewer_render(program, tmp_path):
+    """A function that runs ``viewer render`` on one joint; it also returns the picture's path."""
+
+    def render(*arguments: str, **environment: str):
+        skel, output = tmp_path / "one.skel", tmp_path / "one.png"
+        skel.write_text(TINY_SKEL)
+        size = [] if "--size" in arguments else ["--size", "64x48"]
+        size += [] if "--quality" in arguments else ["--quality", "draft"]
+        words = ("render", str(skel), "-o", str(output), *size, *arguments)
+        return program(*words, **environment), output
+
+    return render
 
 
 def check_refusal(result, output: Path, code: int, message: str) -> None:
@@ -78,8 +88,8 @@ INSTALL = "(on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri)"
 
 
 @LINUX
-def test_missing_egl_device_is_reported_with_remedies(tmp_path):
-    result = viewer_render(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
+def test_missing_egl_device_is_reported_with_remedies(viewer_render):
+    result = viewer_render(__EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
     check_refusal(
         *result,
         code=4,
@@ -90,9 +100,9 @@ def test_missing_egl_device_is_reported_with_remedies(tmp_path):
 
 @LINUX
 @pytest.mark.usefixtures("mesa")
-def test_missing_driver_files_are_reported_in_one_line(tmp_path):
+def test_missing_driver_files_are_reported_in_one_line(viewer_render):
     """Warnings printed by Mesa must not precede the message."""
-    result = viewer_render(tmp_path, LIBGL_DRIVERS_PATH="/nonexistent")
+    result = viewer_render(LIBGL_DRIVERS_PATH="/nonexistent")
     check_refusal(
         *result,
         code=4,
@@ -103,8 +113,8 @@ def test_missing_driver_files_are_reported_in_one_line(tmp_path):
 
 @LINUX
 @pytest.mark.usefixtures("mesa")
-def test_old_opengl_is_reported_with_its_version_and_renderer(tmp_path):
-    result, output = viewer_render(tmp_path, MESA_GL_VERSION_OVERRIDE="3.1")
+def test_old_opengl_is_reported_with_its_version_and_renderer(viewer_render):
+    result, output = viewer_render(MESA_GL_VERSION_OVERRIDE="3.1")
     assert result.returncode == 4
     assert result.stderr.startswith(
         "viewer: OpenGL 3.3 is needed; this machine offers 3.1 (renderer "
@@ -124,8 +134,8 @@ def test_old_opengl_is_reported_with_its_version_and_renderer(tmp_path):
         ("MESA_GL_VERSION_OVERRIDE", "2.1", ("OpenGL 3.3 is needed", "offers 2.1")),
     ],
 )
-def test_old_shading_language_is_distinguished_from_old_opengl(tmp_path, name, value, words):
-    result, output = viewer_render(tmp_path, **{name: value})
+def test_old_shading_language_is_distinguished_from_old_opengl(viewer_render, name, value, words):
+    result, output = viewer_render(**{name: value})
     assert result.returncode == 4 and result.stderr.count("\n") == 1, result.stderr
     for word in (*words, "renderer ", f"{name}={value}"):
         assert word in result.stderr
@@ -148,38 +158,34 @@ def test_old_shading_language_is_distinguished_from_old_opengl(tmp_path, name, v
         ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
     ],
 )
-def test_doctor_reports_the_same_message(request, environment, code, words):
+def test_doctor_reports_the_same_message(request, program, environment, code, words):
     if any(name.startswith("MESA_") for name in environment):
         request.getfixturevalue("mesa")
-    variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
-    done = subprocess.run(
-        [sys.executable, "-m", "viewer", "doctor"],
-        cwd=ROOT, env=variables, capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
+    done = program("doctor", **{"WAYLAND_DISPLAY": "", **environment})
     assert (done.returncode, done.stderr) == (code, "")
     assert all(word in done.stdout for word in words)
 
 
 @LINUX
-def test_missing_libegl_is_reported_with_its_package(tmp_path):
-    result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBEGL="libnope.so")
+def test_missing_libegl_is_reported_with_its_package(viewer_render):
+    result = viewer_render(GLCONTEXT_LINUX_LIBEGL="libnope.so")
     check_refusal(
         *result, code=4, message=f"libEGL was not found {INSTALL} [libnope.so not loaded]"
     )
 
 
 @LINUX
-def test_missing_libgl_is_reported_with_its_package(tmp_path):
-    result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBGL="libnope.so")
+def test_missing_libgl_is_reported_with_its_package(viewer_render):
+    result = viewer_render(GLCONTEXT_LINUX_LIBGL="libnope.so")
     check_refusal(*result, code=4, message=f"libGL was not found {INSTALL} [libnope.so not loaded]")
 
 
 @LINUX
-def test_missing_device_is_reported_with_the_number_of_devices(tmp_path):
+def test_missing_device_is_reported_with_the_number_of_devices(viewer_render):
     count = device_count()
     known = "0, the only one," if count == 1 else f"0 to {count - 1},"
     for number in ("99", "-1"):
-        result, output = viewer_render(tmp_path, "--gpu", number)
+        result, output = viewer_render("--gpu", number)
         assert result.returncode == 2 and result.stderr.count("\n") == 1
         for word in ("--gpu", f"expected {known}", f"found {number} "):
             assert word in result.stderr
@@ -193,24 +199,22 @@ def test_missing_device_is_reported_before_files_are_read(tmp_path, capsys):
 
 
 @LINUX
-def test_only_a_negative_device_number_is_a_usage_error(tmp_path):
+def test_only_a_negative_device_number_is_a_usage_error(viewer_render):
     for number, code, word in (("0", 4, "EGL found 0 devices"), ("-1", 2, "expected 0 or more")):
-        result, _ = viewer_render(
-            tmp_path, "--gpu", number, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent"
-        )
+        result, _ = viewer_render("--gpu", number, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
         assert result.returncode == code and word in result.stderr
 
 
 @LINUX
-def test_first_device_can_be_requested(tmp_path):
-    result, output = viewer_render(tmp_path, "--gpu", "0")
+def test_first_device_can_be_requested(viewer_render):
+    result, output = viewer_render("--gpu", "0")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 
 
 @pytest.mark.parametrize("size", ["0x48", "64x0", "0x0", "100000x48", "64x100000"])
-def test_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
-    result, output = viewer_render(tmp_path, "--size", size)
+def test_size_that_cannot_be_drawn_is_a_usage_error(viewer_render, size):
+    result, output = viewer_render("--size", size)
     width, height = size.split("x")
     assert result.returncode == 2
     assert "Traceback" not in result.stderr
@@ -219,8 +223,8 @@ def test_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
     assert not output.exists()
 
 
-def test_too_many_samples_are_reduced_to_the_maximum(tmp_path):
-    result, output = viewer_render(tmp_path, "--samples", "4096")
+def test_too_many_samples_are_reduced_to_the_maximum(viewer_render):
+    result, output = viewer_render("--samples", "4096")
     assert result.returncode == 0
     assert result.stderr.startswith("warning: 4096 samples per pixel requested, ")
     assert result.stderr.count("\n") == 1
@@ -229,17 +233,17 @@ def test_too_many_samples_are_reduced_to_the_maximum(tmp_path):
 
 @LINUX
 @pytest.mark.usefixtures("mesa")
-def test_different_rasteriser_draws_without_warnings(tmp_path):
+def test_different_rasteriser_draws_without_warnings(viewer_render):
     result, output = viewer_render(
-        tmp_path, "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"
+        "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"
     )
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 
 
 @LINUX
-def test_drawing_does_not_need_a_display(tmp_path):
-    result, output = viewer_render(tmp_path, DISPLAY="", WAYLAND_DISPLAY="")
+def test_drawing_does_not_need_a_display(viewer_render):
+    result, output = viewer_render(DISPLAY="", WAYLAND_DISPLAY="")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 
