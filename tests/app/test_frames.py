@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from driven_window import IMPORTED
+from forked_programs import Forker
 from x_server import x_server
 
 from viewer.app.actors.following import toggle_following
@@ -183,44 +185,54 @@ def server():
         yield found
 
 
-def ended(server, tmp_path, word="", program=PROGRAM):
-    """Return how the viewer ended after losing its display."""
+@pytest.fixture(scope="module")
+def forker():
+    """A process that has imported the viewer."""
+    kept = Forker(IMPORTED)
+    yield kept
+    kept.close()
+
+
+@pytest.fixture
+def ended(server, forker, tmp_path):
+    """A function that runs the viewer until it has lost its display."""
     process, display = server
     environment = {
         **os.environ,
         "DISPLAY": display,
         "LIBGL_ALWAYS_SOFTWARE": "1",
-        "PYTHONPATH": str(ROOT),
         "XDG_STATE_HOME": str(tmp_path / "state"),
     }
     environment.pop("WAYLAND_DISPLAY", None)
     rig = write_rig(tmp_path)
-    return subprocess.run(
-        [sys.executable, "-c", program, str(process.pid), str(word), *map(str, rig), *DRAFT_WORDS],
-        env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+
+    def end(word="", program=PROGRAM):
+        words = [process.pid, word, *rig, *DRAFT_WORDS]
+        return forker.run(program, words, tmp_path, environment)
+
+    return end
 
 
 def check_end(done, display):
-    lines = done.stderr.splitlines()
-    assert done.returncode == 4 and len(lines) == 1, done.stderr
+    lines = done.stderr.decode().splitlines()
+    assert done.returncode == 4 and len(lines) == 1, lines
     assert lines[0].startswith("viewer: ") and "X server" in lines[0] and display in lines[0]
 
 
-def test_lost_display_prints_one_line_and_ends_with_exit_code_4(server, tmp_path):
-    check_end(ended(server, tmp_path), server[1])
+def test_lost_display_prints_one_line_and_ends_with_exit_code_4(server, ended):
+    check_end(ended(), server[1])
 
 
-def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
+def test_lost_display_leaves_no_half_written_recording(server, ended, tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
-    check_end(ended(server, tmp_path, folder), server[1])
+    check_end(ended(folder), server[1])
     assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("step", ["create_window", "make_context_current", "swap_interval"])
-def test_display_lost_at_start_prints_the_same_message(server, tmp_path, step):
-    check_end(ended(server, tmp_path, step, START), server[1])
+def test_display_lost_at_start_prints_the_same_message(server, ended, step):
+    check_end(ended(step, START), server[1])
 
 
 def test_previous_handler_is_restored():
