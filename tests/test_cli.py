@@ -205,19 +205,6 @@ def test_pipe_closed_before_anything_is_written_is_silent(rig):
     assert process.wait(30) == 0
 
 
-def test_full_disk_is_exit_code_5(rig):
-    with Path("/dev/full").open("wb") as full:
-        _refused(call("info", *rig, stdout=full), 5, "No space left")
-
-
-def test_missing_output_stream_is_not_an_error(rig):
-    line = f"{sys.executable} -m viewer info {rig[0]} >&-"
-    done = subprocess.run(
-        ["bash", "-c", line], env=ENVIRONMENT, capture_output=True, timeout=60, check=False
-    )
-    assert done.returncode == 0 and done.stderr == b""
-
-
 def test_terminal_without_unicode_is_not_an_error(tmp_path):
     path = tmp_path / "f.skel"
     path.write_text("balljoint Küken { pose 1 0 0 }")
