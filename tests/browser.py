@@ -106,6 +106,7 @@ class Browser:
     def settle(self) -> None:
         """Wait until changes are drawn."""
         self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.run("window.viewer?.ready.then(page => page.drawn)")
 
     def run(self, script: str) -> object:
         """Return the value of an expression of the page; promises are awaited."""

@@ -171,7 +171,7 @@ def test_camera_follows_the_mean_of_the_joints(browser, tmp_path):
     actor = viewer.animate(figure, rotations, translations=moves, fps=10.0)
     viewer.export(actor, tmp_path / "a.html")
     browser.open(tmp_path / "a.html")
-    target = "viewer.ready.then(page => { page.draw(); return page.camera.target; })"
+    target = "viewer.ready.then(page => { page.pose(); return page.camera.target; })"
     before = np.array(browser.run(target))
     browser.run("document.getElementById('follow').click(); viewer.seek(0.3)")
     assert_allclose(browser.run(target), before + moves[3] - moves[0], atol=1e-4)

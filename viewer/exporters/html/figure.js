@@ -166,7 +166,8 @@ class Figure {
         (name in surface.uniforms ? surface.uniforms : surface.outline.uniforms)[name] = values;
       }
     if (this.isAttached) this.skin(tracks.palette(this.data.mesh.center));
-    this.sortedFor = null;
+    this.sortedFor = null;  // the direction for which blended triangles are sorted
+    this.nPoses = (this.nPoses || 0) + 1;
   }
 
   // Displaces the rest vertices, and computes or displaces the rest normals, as shape.py does.
@@ -223,16 +224,9 @@ class Figure {
     gl.bindVertexArray(null);
   }
 
-  // Positions and unit normals of split vertices, in rows of six, as the shader computed them.
-  readPosed() {
-    const gl = this.gl, rows = new Float32Array(6 * this.nVertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.posed);
-    gl.getBufferSubData(gl.ARRAY_BUFFER, 0, rows);
-    return rows;
-  }
-
-  // The same, read from a copy once the graphics card has finished: nothing waits for it.
-  async readPosedLater() {
+  // Positions and unit normals of split vertices, in rows of six, as the shader computed them. They
+  // are read from a copy once the graphics card has finished: nothing waits for it.
+  async readPosed() {
     const gl = this.gl, rows = new Float32Array(6 * this.nVertices), copy = gl.createBuffer();
     gl.bindBuffer(gl.COPY_READ_BUFFER, this.posed);
     gl.bindBuffer(gl.COPY_WRITE_BUFFER, copy);
@@ -240,9 +234,8 @@ class Figure {
     gl.copyBufferSubData(gl.COPY_READ_BUFFER, gl.COPY_WRITE_BUFFER, 0, 0, rows.byteLength);
     gl.bindBuffer(gl.COPY_READ_BUFFER, null);
     const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
-    do await new Promise((next) => setTimeout(next));
-    while (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED);
+    do await new Promise((next) => setTimeout(next, 4));
+    while (gl.clientWaitSync(done, gl.SYNC_FLUSH_COMMANDS_BIT, 0) === gl.TIMEOUT_EXPIRED);
     gl.deleteSync(done);
     gl.bindBuffer(gl.COPY_WRITE_BUFFER, copy);
     gl.getBufferSubData(gl.COPY_WRITE_BUFFER, 0, rows);
@@ -252,7 +245,7 @@ class Figure {
 
   // Positions and normals (V, 3) of the figure's vertices in its own space.
   async posedVertices() {
-    const rows = await this.readPosedLater(), positions = [], normals = [];
+    const rows = await this.readPosed(), positions = [], normals = [];
     const [scale, offset] = [this.model[0], this.model.slice(12, 15)];
     this.sources.forEach((v, row) => {
       positions[v] = [0, 1, 2].map((i) => scale * (rows[6 * row + i] + this.center[i]) + offset[i]);
@@ -360,14 +353,24 @@ class Figure {
     gl.disable(gl.CULL_FACE);
   }
 
+  // Whether ``readRows`` is needed before the figure is drawn.
+  get isUnsorted() { return this.isDrawn && this.blended?.length > 0 && this.sortedFor === null; }
+
+  // Reads the positions by which blended triangles are sorted.
+  async readRows() {
+    const pose = this.nPoses;
+    this.posedRows = await this.readPosed();
+    if (this.nPoses === pose) this.sortedFor = "";
+  }
+
   // Blended triangles from the farthest to the nearest, and their surfaces; see material_runs.py.
   sorted(camera) {
     const gl = this.gl, { u_model_view: m } = this.placing(camera);
     const along = [m[2], m[6], m[10]], key = along.join();
     if (this.sortedFor === key) return this.order;
-    if (this.sortedFor === null) this.posedRows = this.readPosed();
-    this.sortedFor = key;
-    const rows = this.posedRows, depth = (v) =>
+    if (this.sortedFor !== null) this.sortedFor = key;
+    // Nothing is read yet if the figure has just become visible; the next frame reads it.
+    const rows = this.posedRows || new Float32Array(6 * this.nVertices), depth = (v) =>
       along[0] * rows[6 * v] + along[1] * rows[6 * v + 1] + along[2] * rows[6 * v + 2];
     const total = this.blended.reduce((sum, { count }) => sum + count, 0);
     const indices = new Uint32Array(total), ranges = [];

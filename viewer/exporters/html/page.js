@@ -59,8 +59,11 @@ class Page {
       this.last = now;
       this.advance(passed * Number(element("speed").value));
     }
-    this.draw();
-    if (this.isPlaying) this.change();
+    this.pose();
+    const unsorted = this.figures.filter((each) => each.isUnsorted);
+    if (unsorted.length)
+      this.drawn = Promise.all(unsorted.map((each) => each.readRows())).then(() => this.draw());
+    else this.draw();
   }
 
   advance(seconds) {
@@ -136,7 +139,6 @@ class Page {
     if (gl.isContextLost()) return;
     const size = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(1, Math.round(x * ratio)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
-    this.pose();
     this.camera.update(...size);
     const edge = Math.round(this.divider * size[0]);
     const parts = this.isDivided ? [["left", 0, edge], ["right", edge, size[0]]] : [["both", 0, size[0]]];
@@ -148,6 +150,7 @@ class Page {
     canvas.classList.add("ready");
     element("poster")?.remove();
     this.messages.send();
+    if (this.isPlaying) this.change();
   }
 
   // Draws some figures in the columns of the image from one to another.
