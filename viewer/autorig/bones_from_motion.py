@@ -362,10 +362,10 @@ def _timed(moving: MovingMesh, clip: SampledClip) -> tuple[SampledClip, Floats]:
     """Return a clip with missing frames interpolated, and the times of the known ones."""
     timing = clip.timing
     known = np.flatnonzero(timing.present)
-    times: Floats = timing.start + known / timing.frame_rate
+    times: Floats = timing.times[known]
     if len(known) == timing.n_frames:
         return clip, times
-    every = timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    every = timing.times
     filled = clip.sample(None, every, interpolate=True)
     whole = replace(timing, rows=np.arange(timing.n_frames, dtype=np.int32))
     return (

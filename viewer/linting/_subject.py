@@ -302,7 +302,7 @@ def _track(subject: Subject) -> Track | None:
     if clip.timing is not None:
         timing = clip.timing
         count, per_frame = timing.n_frames, 1
-        times = timing.start + np.arange(count) / timing.frame_rate
+        times = timing.times
         numbers = timing.first_frame + np.arange(count, dtype=np.int32)
     else:
         times = key_times(subject, clip)

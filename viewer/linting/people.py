@@ -155,7 +155,7 @@ def _path(actor: Actor) -> _Path | None:
         return _Path(clip.timing, present, means @ turn.T + place, scale * size)
     if clip is None or figure.skeleton is None:
         return None
-    times = clip.timing.start + np.arange(clip.timing.n_frames) / clip.timing.frame_rate
+    times = clip.timing.times
     frames = frames_of(figure, clip, times, actor.own_pose)
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     roots = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])

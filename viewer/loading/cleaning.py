@@ -420,7 +420,7 @@ def _places(figure: Figure, clip: Captured, frames: Ints) -> Floats:
         points = clip.points[clip.timing.rows[frames]]
         seen = (points[..., 3:] > 0.0).astype(float)
         return (points[..., :3] * seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1.0)
-    times = clip.timing.start + frames / clip.timing.frame_rate
+    times = clip.timing.times[frames]
     return world_frames(figure, frames_of(figure, clip, times))[:, 0, :3, 3]
 
 
@@ -458,7 +458,7 @@ class Displacement:
 def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) -> Displacement:
     """Return how far joints move, at the times of the first motion's frames."""
     timing = before.timing
-    times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    times = timing.times
     inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)
     frames = np.flatnonzero(timing.present & inside)
     total, count, worst = 0.0, 0, Displacement()
@@ -483,7 +483,7 @@ def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) 
 def point_displacement(before: PointClip, after: PointClip) -> Displacement:
     """Return how far points move in the frames of the first motion in which both are visible."""
     timing = before.timing
-    times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    times = timing.times
     inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)
     rows, _, fraction = after.timing.locate(times)
     frames = np.flatnonzero(timing.present & inside & (rows >= 0) & (fraction == 0.0))

@@ -211,7 +211,7 @@ def between_losses(
             estimate = Phrase("an estimate from {n}", n=counted(worst.looked, "time"))
     else:
         motion = animation.motion
-        own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
+        own = motion.timing.times
         place = (own - animation.frames.times[0]) * animation.frame_rate
         is_between = np.abs(place - np.round(place)) > _ON_FRAME
         times = own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]

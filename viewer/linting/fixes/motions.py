@@ -190,7 +190,7 @@ def _smoother_rows(
 ) -> SampledClip | None:
     """Return frames whose joints are interpolated where they pop."""
     timing = clip.timing
-    rows, frames = timing.rows, timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    rows, frames = timing.rows, timing.times
     part = clip.rotations if path == "rotation" else clip.translations
     if part is None or not timing.present.all():
         return None

@@ -109,7 +109,7 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
         return clip, Gaps(closed, left)
     frames = np.concatenate([np.arange(*gap) for gap in closed])
     timing = clip.timing
-    times = timing.start + frames / timing.frame_rate
+    times = timing.times[frames]
     rows = timing.rows.copy()
     count = clip.n_rows
     rows[frames] = count + np.arange(len(frames), dtype=np.int32)

@@ -37,7 +37,7 @@ def path_times(motion: Motion) -> Floats:
         length = motion.end - motion.start
         steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
         return np.linspace(motion.start, motion.end, max(steps, 0) + 1)
-    return timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    return timing.times
 
 
 def motion_path(

@@ -85,6 +85,11 @@ class Timing:
         return self.start + max(self.n_frames - 1, 0) / self.frame_rate
 
     @property
+    def times(self) -> Floats:
+        """Seconds of all frames: (F,)."""
+        return self.start + np.arange(self.n_frames) / self.frame_rate
+
+    @property
     def present(self) -> Bools:
         """Mask of the frames that exist: (F,)."""
         return self.rows >= 0

@@ -105,7 +105,7 @@ def _of_body(actor: Actor, clip: SampledClip) -> Floats:
     if skeleton is None or not {"pelvis", "head"} <= set(skeleton.names):
         return np.zeros((0, 3))
     there = np.flatnonzero(clip.timing.present)[:_ENOUGH]
-    times = clip.timing.start + there / clip.timing.frame_rate
+    times = clip.timing.times[there]
     places = world_frames(actor.figure, frames_of(actor.figure, clip, times))[..., :3, 3]
     names = skeleton.names
     return np.asarray(places[:, names.index("head")] - places[:, names.index("pelvis")])
