@@ -385,6 +385,30 @@ def test_long_trunk_with_a_single_limb_bends(monkeypatch):
     assert joints["limb_1_end"][2] < -1.3
 
 
+def test_nearly_limbs_on_one_side_are_limbs_if_those_of_the_other_are():
+    # The stub on the left is a little longer than the limit, that on the right a little shorter.
+    trunk = pipe([(0, 0, -0.5), (0, 0, 0.5)], 0.5, around=16)
+    legs = [pipe([(side * 0.3, 0, -0.4), (side * 0.9, -0.9, -0.6)], 0.1) for side in (-1, 1)]
+    stubs = [
+        pipe([(side * 0.2, 0, 0.3), (side * length, 0, 0.3)], 0.22, around=12)
+        for side, length in ((1, 0.83), (-1, 0.77))
+    ]
+    result = found(united(trunk, *legs, *stubs))
+    assert "4 limbs, 2 pairs" in str(result.lines[0])
+    joints = joints_of(result.figure.skeleton)
+    left, right = joints["limb_1_left_end"], joints["limb_1_right_end"]
+    assert_allclose(left, right * [-1, 1, 1], atol=0.15)
+
+
+def test_arm_on_a_flat_base_has_its_root_there():
+    base = box((-0.5, 0, -0.5), (0.5, 0.1, 0.5))
+    arm_of = [(0, 0.05, 0), (0, 1.2, 0), (0, 1.6, 1.0), (0, 1.2, 1.5)]
+    fingers = [box((x - 0.03, 0.75, 1.45), (x + 0.03, 1.2, 1.55)) for x in (-0.12, 0.12)]
+    hand = box((-0.2, 1.1, 1.4), (0.2, 1.3, 1.6))
+    joints = joints_of(found(united(base, pipe(arm_of, 0.12), hand, *fingers)).figure.skeleton)
+    assert_allclose(joints["root"], [0.0, 0.05, 0.0], atol=0.15)
+
+
 def test_limb_from_a_hub_begins_at_it_even_if_it_tapers():
     # A spiral: a bone from the root to where the tail is thin would cross the turns.
     angles = np.linspace(0.0, 3.5 * np.pi, 60)
@@ -402,21 +426,21 @@ def test_corners_of_a_cut_are_no_limbs():
         _cut_widths=[0.2], _middles=np.array([[0.9, 0, 0], [3.0, 0, 0]]),
     )  # fmt: skip
     near._is_at_cut = lambda found: curve_skeleton._Field._is_at_cut(near, found)
-    assert not curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (0,), ()))
+    assert not curve_skeleton._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (0,), ()))
     # Neither is one that begins elsewhere, nor a longer one, a corner.
-    assert curve_skeleton._Field._is_limb(near, Protrusion(1.0, 0.8, (1,), ()))
-    assert curve_skeleton._Field._is_limb(near, Protrusion(1.5, 0.8, (0,), ()))
+    assert curve_skeleton._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (1,), ()))
+    assert curve_skeleton._Field._is_limb(near, Protrusion(0, 1.5, 0.8, (0,), ()))
 
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
     field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
-    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ((0.6, (0,)),)))
+    assert curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.6, (0,)),)))
     # The corner of a fan, as a bird's tail, is no limb.
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ((0.75, (0,)),)))
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), ()))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.75, (0,)),)))
+    assert not curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ()))
     # A leg that met a corner of its own foot first is one all the same.
     met = (0.75, (0,)), (0.6, (0,))
-    assert curve_skeleton._Field._is_limb(field, Protrusion(1.0, 0.5, (1,), met))
+    assert curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), met))
 
 
 def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):

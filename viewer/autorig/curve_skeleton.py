@@ -91,8 +91,9 @@ _TAPERED = 2.0
 # such a part at the end of a limb, relative to the half width of the limb, that is a plate.
 _BESIDE, _RIM = 0.5, 2.0
 # What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
-# to the solid's, and the ratio of the foot's radius to theirs.
+# to the solid's, and the ratio of the foot's half width to their radii.
 _FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
+_UPRIGHT = 0.3  # height, relative to the size, of what stands rather than lies
 # Radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake.
 _BODY = 2.0
 
@@ -127,6 +128,7 @@ _CENTRAL = 1.5  # distance from the plane, in voxels or half widths, up to which
 _AROUND_MIDDLE = 0.25  # the same of the root, relative to where the first limb begins
 _MIRRORED = 1.5  # distance of a limb's path from the mirrored one, likewise
 _SAMPLES = 64  # points of paths that are compared
+_NOWHERE = np.zeros((0, 3))
 _ON_GROUND = 0.12  # height of the tip of a leg, relative to the solid's, as in ``anatomy``
 _ASKEW = 0.5  # cosine of the angle between directions that are different ones
 _TRUNK = "trunk"
@@ -187,16 +189,22 @@ def at_lengths(points: Floats, lengths: Floats) -> Floats:
     return np.stack([np.interp(lengths, known, column) for column in points.T], axis=1)
 
 
+def _least(solid: Solid) -> float:
+    """Return the length of the shortest limb, and the distance up to which places are the same."""
+    size = solid.spacing * max(solid.inside.shape)
+    return max(_SHORTEST * size, _VOXELS * solid.spacing)
+
+
 class _Field:
     """Distances from a voxel of a solid, their level sets, and the paths from its tips."""
 
-    def __init__(self, solid: Solid, paths: Paths, source: int) -> None:
+    def __init__(self, solid: Solid, paths: Paths, source: int, wanted: Floats) -> None:
         from scipy.sparse import csgraph
 
         self.solid, self.radii = solid, paths.radii
         self.centers = solid.centers(solid.voxels)
-        size = solid.spacing * max(solid.inside.shape)
-        self._least = max(_SHORTEST * size, _VOXELS * solid.spacing)
+        self._least = _least(solid)
+        self._wanted = wanted
         self.cuts = np.zeros((0, 3))
         """(C, 3). Places where loops were cut."""
         self._cut_widths: list[float] = []
@@ -217,7 +225,7 @@ class _Field:
             self.cuts = np.concatenate([self.cuts, self.centers[ends].mean(axis=0)[None]])
             self._cut_widths.append(float(self._widths[np.concatenate(loop)].max()))
         self._middles = self._levels.middles(self.centers)
-        self.tips = self._levels.tips(self._is_limb)
+        self.tips = self._levels.tips(lambda found: self._is_limb(found) or self._is_wanted(found))
         routes = paths.to(np.array([source]), self.tips.rows)
         self.routes = {k: route[::-1] for k, route in enumerate(routes) if self._stands(k, route)}
         """Paths to the tips of limbs, by the index of the tip."""
@@ -232,6 +240,14 @@ class _Field:
         is_long = found.tip - found.junction >= max(_OWN * width, self._least)
         return is_long and not self._is_at_cut(found)
 
+    def _is_wanted(self, found: Protrusion) -> bool:
+        """Return whether a protrusion ends where a limb is expected, and is more than a bump."""
+        is_long = found.tip - found.junction >= self._least
+        return is_long and self._is_near_wanted(self._middles[found.top])
+
+    def _is_near_wanted(self, place: Floats) -> bool:
+        return bool((np.linalg.norm(self._wanted - place, axis=1) <= self._least).any())
+
     def _is_at_cut(self, found: Protrusion) -> bool:
         """Return whether a protrusion is no longer than a cut is wide and begins there."""
         middle = self._middles[list(found.base)].mean(axis=0)
@@ -245,7 +261,7 @@ class _Field:
         # to the tip of a limb that met no other, they are narrower.
         half = 0.5 * float(self.distances[route[0]])
         there = route[int(np.abs(self.distances[route] - half).argmin())]
-        if self.widths(there) < half:
+        if self.widths(there) < half or self._is_near_wanted(self.centers[route[0]]):
             return True
         # That may be inside of the trunk. The rim around a foot met the arm on it before.
         parted = max((at for at, those in self.tips.meetings if tip in those), default=0.0)
@@ -294,9 +310,12 @@ class _Field:
         return max(met, default=0.0)
 
 
-def tree_of(solid: Solid, paths: Paths, source: int) -> Tree:
-    """Return the paths from the tips of a solid to one of its voxels, as hubs and chains."""
-    field = _Field(solid, paths, source)
+def tree_of(solid: Solid, paths: Paths, source: int, wanted: Floats = _NOWHERE) -> Tree:
+    """Return the paths from the tips of a solid to one of its voxels, as hubs and chains.
+
+    ``wanted`` (N, 3): places of tips, where short protrusions are limbs, too.
+    """
+    field = _Field(solid, paths, source, wanted)
     hub_of, hubs = _hubs(field, source)
     passed = {k: {hub_of.get(row) for row in route.tolist()} for k, route in field.routes.items()}
     members = [[row for row, hub in hub_of.items() if hub == number] for number in range(len(hubs))]
@@ -462,17 +481,24 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     """Return the voxel in which the skeleton has its root; ``heights`` (N,) of all voxels."""
     low, high = float(heights.min()), float(heights.max())
     inwards = [route[::-1] for route in tree.routes]
+    ends = [int(route[0]) for route in inwards]
     if sum(chain.start == 0 for chain in tree.chains) == 1:
-        inwards.append(_blunt_end(solid, paths, tree))
+        blunt, is_long = _blunt_end(solid, paths, tree)
+        inwards.append(blunt)
+        ends.append(int(blunt[0 if is_long else -1]))
     inside = [_inside_end(solid, paths, route) for route in inwards]
     wide = paths.radii[inside]
     relative = (heights[inside] - wide - low) / max(high - low, solid.spacing)
     foot = int(relative.argmin())
     others = np.delete(np.arange(len(inside)), foot)
+    steady = float(wide[foot])
+    if high - low >= _UPRIGHT * solid.spacing * max(solid.inside.shape):
+        # A foot may be a flat disc, which is as steady as it is wide; the jaw of a snake is none.
+        steady = max(steady, _footprint(solid, heights <= low + _FOOT * (high - low)))
     if (
         relative[foot] <= _FOOT
         and (relative[others] >= _STANDS).all()
-        and (wide[foot] >= _STEADY * wide[others]).all()
+        and (steady >= _STEADY * wide[others]).all()
     ):
         top = low + 2.0 * float(wide[foot])
         if top > 0.5 * (low + high):  # a snake
@@ -485,7 +511,7 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
         thickest = max(chain.half_width for chain in tree.chains)
         if between and tree.radii[0] >= _BODY * thickest:
             return int(tree.rows[0])
-        return _thicker_end(solid, paths, [int(route[0]) for route in inwards])
+        return _thicker_end(solid, paths, ends)
     # As in the centroid of a tree, with tips as weights; ties go to the wider place.
     count = len(tree.routes)
     most = []
@@ -496,25 +522,34 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
 
 
-def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> Ints:
+def _footprint(solid: Solid, lowest: Bools) -> float:
+    """Return the radius of the largest circle below the lowest voxels, a mask (N,) of all."""
+    from scipy import ndimage
+
+    voxels = solid.voxels[lowest]
+    upwards = int(np.ptp(voxels, axis=0).argmin())
+    ground = np.zeros(np.delete(solid.inside.shape, upwards), dtype=np.bool_)
+    ground[tuple(np.delete(voxels, upwards, axis=1).T)] = True
+    return solid.spacing * float(ndimage.distance_transform_edt(ground).max())
+
+
+def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> tuple[Ints, bool]:
     """Return the voxels of the way from the end opposite of the only limb to the first hub.
 
-    The head of a fish is no limb, as it is wider than long, but the end of a long trunk. That of a
-    bottle or of a mushroom is not longer than wide, and the way is the hub itself.
+    Also returns whether that part is long: the head of a fish is no limb, as it is wider than long,
+    but the end of a long trunk. The foot of a bottle or the hat of a mushroom is not.
     """
     from scipy.sparse import csgraph
 
     hub = int(tree.rows[0])
     ways = csgraph.dijkstra(paths.steps, indices=[int(tree.routes[0][-1])], min_only=True)
     end, beyond = int(ways.argmax()), ways >= ways[hub]
+    (found,) = paths.to(np.array([hub]), np.array([end]))
     if end == hub:
-        return tree.rows[:1]
+        return found, False
     # As in ``LevelSets.half_widths``, but of the second largest extent: a plate has two.
     extents = np.linalg.eigvalsh(np.cov(solid.centers(solid.voxels[beyond]).T))
-    if ways[end] - ways[hub] < _SLENDER * 2.0 * np.sqrt(extents[1]):
-        return tree.rows[:1]
-    (found,) = paths.to(np.array([hub]), np.array([end]))
-    return found
+    return found, bool(ways[end] - ways[hub] >= _SLENDER * 2.0 * np.sqrt(extents[1]))
 
 
 def _middle_of_plate(solid: Solid, tree: Tree) -> int | None:
@@ -1005,7 +1040,7 @@ def joints_in(
     """Return the joints of a solid; ``up``, ``front``: (3,), its directions."""
     report_fraction(0.0, "looking for limbs")
     paths = Paths(solid)
-    tree = rooted_tree(solid, paths, up)
+    tree = _completed(solid, paths, rooted_tree(solid, paths, up), up, front, how.symmetry)
     if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
         raise RigError("expected a solid with limbs, found a sheet without thickness")
     report_fraction(0.8, "placing joints")
@@ -1131,6 +1166,34 @@ def _symmetry_of(
         if 2 * sum(number in partner for number in ends) < len(ends):
             return None, {}
     return plane, partner
+
+
+def _completed(
+    solid: Solid, paths: Paths, tree: Tree, up: Floats, front: Floats, symmetry: str
+) -> Tree:
+    """Return a tree with the limbs of one side on the other, too, where they are nearly limbs.
+
+    On both sides of a short or wide limb, small differences decide whether it is one.
+    """
+    plane, partner = _symmetry_of(solid, tree, up, front, symmetry)
+    if plane is None:
+        return tree
+    ends = []
+    for number, chain in enumerate(tree.chains):
+        # The tail of a bird ends at a corner of its fan, but is in the middle.
+        middle = at_lengths(chain.points, np.array([0.5 * (chain.begin + chain.length)]))[0]
+        is_beside = abs(float(plane.sides(middle))) > chain.half_width
+        if chain.end < 0 and number not in partner and is_beside:
+            ends.append(chain.points[-1])
+    wanted = plane.mirrored(np.array(ends).reshape(-1, 3))
+    wanted = wanted[solid.gaps(wanted) <= _least(solid)]
+    if len(wanted) == 0:
+        return tree
+    wanted = solid.centers(solid.voxels[solid.nearest(wanted)])
+    found = tree_of(solid, paths, int(tree.rows[0]), wanted)
+    pairs = _symmetry_of(solid, found, up, front, symmetry)[1]
+    more = replace(found, cuts=np.concatenate([tree.cuts, found.cuts]))
+    return more if len(pairs) > len(partner) else tree
 
 
 def _plane_of(

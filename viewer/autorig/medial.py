@@ -80,6 +80,8 @@ def _cut(graph: csr_array, first: Bools, second: Bools) -> tuple[csr_array, Ints
 class Protrusion:
     """A part of the level sets above a junction, as seen from there."""
 
+    top: int
+    """The level set of its tip."""
     tip: float
     """Largest distance of its tip."""
     junction: float
@@ -162,6 +164,7 @@ class LevelSets:
                     if len(tips) > 1
                     and stays(
                         Protrusion(
+                            tip,
                             float(self._farthest[tip]),
                             junction,
                             base_of[tip],
