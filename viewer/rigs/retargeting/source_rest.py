@@ -45,6 +45,7 @@ _AXES = (
     "F007.rest-axes: rest pose of {motion}: a T-pose, in which its joint axes are parallel to the "
     "body's, because its zero pose is not a standing pose{remedy}"
 )
+_REMEDY = Remedy("", " (--source-rest overrides it)")
 
 
 def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
@@ -98,7 +99,8 @@ def with_source_rest(
             else "F007.rest-lying: rest pose of {motion}: estimated from trunk, knees and elbows, "
             "with an assumed slope of the feet, because the person never stands{remedy}"
         )
-        return _placed(motion, skeleton, found.rotations), [Diagnostic(key, values=called)]
+        note = Diagnostic(key, values={**called, "remedy": _REMEDY})
+        return _placed(motion, skeleton, found.rotations), [note]
     return _estimated(motion, skeleton, upright)
 
 
@@ -123,7 +125,7 @@ def _estimated(
     motion: SkeletonMotion, skeleton: Skeleton, upright: Postures
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
     """Return a motion with a rest pose estimated from its upright frames."""
-    called = {"motion": motion.figure.name, "remedy": Remedy("", " (--source-rest overrides it)")}
+    called = {"motion": motion.figure.name, "remedy": _REMEDY}
     found = anatomical_rest(upright, skeleton)
     if found.is_parallel:
         # More exact than a frame, in which nobody stands perfectly.
@@ -137,12 +139,7 @@ def _estimated(
         note = Diagnostic(
             "F007.rest-frame: rest pose of {motion}: frame {frame}, {pose}, because its zero "
             "pose is not a standing pose{remedy}",
-            values={
-                **called,
-                "frame": frame,
-                "pose": pose,
-                "remedy": Remedy("", " (--source-rest overrides it)"),
-            },
+            values={**called, "frame": frame, "pose": pose},
         )
         return _replaced(motion, skeleton, motion.clip.rotations[row]), [note]
     notes = [
