@@ -358,9 +358,13 @@ def test_vertex_text_is_complete_wherever_the_mouse_is(window, places, surface):
         time.sleep(0.5)
         app.tell("mousemove", place[0] - 3, place[1])
         app.tell("mousemove", *place)
+        _wait_for(
+            lambda: (app.screen()[part] != empty).any(axis=-1).sum() > 5000 or None,
+            "a text of several lines",
+        )
         _wait_for(app.is_asleep, "an idle processor")
         shown = app.screen()[part]
-        assert (shown != empty).any(axis=-1).sum() > 5000  # a text of several lines
+        assert (shown != empty).any(axis=-1).sum() > 5000
         app.key("shift")  # has no effect, but triggers frames
         _wait_for(app.is_asleep, "an idle processor")
         assert (app.screen()[part] == shown).all()
