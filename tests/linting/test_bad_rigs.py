@@ -563,18 +563,24 @@ def apart(figure: Figure, vertices: np.ndarray) -> tuple[Figure, np.ndarray]:
     return Figure(figure.name, split, figure.skeleton, skin), copies
 
 
-def test_seam_with_other_weights_on_one_side_is_torn():
-    """The triangles above a height have vertices of their own; some of these keep their weights."""
+def torn_seam() -> tuple[Figure, Figure, np.ndarray]:
+    """Return a body with a seam, the same with other weights on one side, and their vertices.
+
+    The triangles above a height have vertices of their own.
+    """
     ring = np.flatnonzero(np.abs(body().mesh.positions[:, 1] - 0.2) < 0.1)
     split, copies = apart(body(), ring)
-    assert linted(split, (blending,)) == []
     weights = np.concatenate([table(), table()[ring]])
     torn = copies[np.isin(copies, split.mesh.triangles)][::9]
     weights[torn] = 0.7 * weights[torn]
     weights[torn, joint("pelvis")] += 0.3
-    found = [one for one in linted(weighted(weights, split)) if one.code == "W014"]
-    (one,) = found
-    changed = torn[1.0 - weights[torn, joint("pelvis")] > 0.0]
+    return split, weighted(weights, split), torn[weights[torn, joint("pelvis")] < 1.0]
+
+
+def test_seam_with_other_weights_on_one_side_is_torn():
+    split, torn, changed = torn_seam()
+    assert linted(split, (blending,)) == []
+    (one,) = (one for one in linted(torn) if one.code == "W014")
     assert set(one.vertices.tolist()) <= set(changed.tolist()) and len(one.vertices)
 
 

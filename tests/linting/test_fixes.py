@@ -19,6 +19,7 @@ from linting.test_bad_rigs import (
     swapped,
     table,
     taken,
+    torn_seam,
     tube,
     turned,
     turned_in_another_pose,
@@ -31,6 +32,7 @@ from viewer.exporters import export
 from viewer.linting import (
     Subject,
     bindings,
+    blending,
     lint_files,
     meshes,
     noise,
@@ -162,6 +164,15 @@ def test_noise_is_smoothed_towards_the_weights_before():
     figure, _ = fixed(noise_of_limb, noise)
     errors = [np.linalg.norm(weights_of(one) - table()) for one in (noise_of_limb, figure)]
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_torn_seam_gets_the_weights_of_its_sound_side():
+    sound, torn, _ = torn_seam()
+    (found,) = (one for one in blending.check(Subject(Actor(torn))) if one.code == "W014")
+    figure, note = fixed(torn, blending)
+    named = found.vertices
+    np.testing.assert_allclose(weights_of(figure)[named], weights_of(sound)[named], atol=1e-9)
+    assert f"weights of {len(named)} vertices changed" in note
 
 
 def test_names_and_bindings_are_corrected():

@@ -170,11 +170,24 @@ def _from_nearest(subject: Subject, skin: Skin, vertices: Indices) -> Skin:
 
 
 def _rejoined(skin: Skin, surface: Surface, vertices: Indices) -> Skin:
-    """Give all vertices at the places of some the mean of their weights."""
-    torn = np.isin(surface.place, surface.place[vertices])
-    entries = np.flatnonzero(torn[owners(skin)])
-    places = surface.place[owners(skin)[entries]]
-    return _with_rows(skin, surface, torn, places, skin.joints[entries], skin.weights[entries])
+    """Give all vertices at a place the weights of that which differs least from its neighbours."""
+    places = np.unique(surface.place[vertices])
+    copies = np.flatnonzero(np.isin(surface.place, places))
+    edges = surface.edges[np.isin(surface.edges[:, 0], places)]
+    used = np.unique(np.concatenate([copies, edges[:, 1]]))
+    rows = skin_rows(normalized(skin), used.astype(np.int32))
+    table = np.zeros((len(used), skin.n_joints))
+    np.add.at(table, (owners(rows), rows.joints), rows.weights)
+    start, place = (np.searchsorted(places, k) for k in (edges[:, 0], surface.place[copies]))
+    means = np.zeros((len(places), skin.n_joints))
+    np.add.at(means, start, table[np.searchsorted(used, edges[:, 1])])
+    means /= np.maximum(np.bincount(start, minlength=len(places)), 1)[:, None]
+    errors = np.abs(table[np.searchsorted(used, copies)] - means[place]).sum(axis=1)
+    order = np.lexsort((errors, place))
+    _, first = np.unique(place[order], return_index=True)
+    sources = np.arange(skin.n_vertices, dtype=np.int32)
+    sources[copies] = copies[order[first]][place]
+    return skin_rows(skin, sources)
 
 
 def _with_rows(
