@@ -19,7 +19,7 @@ from viewer.progress import report
 from viewer.rigs.figure import Figure
 from viewer.rigs.scene import Scene, pose_actors
 
-_ROUNDS = 8  # smoothing may need several; a fix that changes nothing ends them
+_ROUNDS = 12  # smoothing may need several; a fix that changes nothing ends them
 
 FIXES = {
     "W002": "weights",
@@ -78,8 +78,14 @@ def fix_scene(
         if not todo or number == _ROUNDS:
             break
         todo.sort(key=lambda one: [*FIXES].index(one.code))
+        # Later findings about the same subject are stale: without leaks, parts that touch are rigid
+        # again, and their seams are not torn.
+        changed: dict[tuple[int, str], str] = {}
         for finding in todo:
             assert finding.actor is not None  # findings of checks are about actors
+            part = finding.actor, FIXES[finding.code]
+            if changed.get(part, finding.code) != finding.code:
+                continue
             subject = Subject(scene.actors[finding.actor], finding.actor, scene.up, chosen)
             fix: Fix = import_module(f"{__name__}.{FIXES[finding.code]}").fix
             figure = subject.actor.figure
@@ -89,6 +95,7 @@ def fix_scene(
             else:
                 notes.append(said)
                 fixed.add(finding.code)
+                changed[part] = finding.code
                 _share(scene, figure, subject.actor.figure)
         if scene.time is not None:
             pose_actors(scene.actors, scene.time)
