@@ -15,6 +15,8 @@ from _pytest.runner import runtestprotocol
 from hypothesis import settings
 from run_time import RunTime
 
+from viewer.diagnostics import Diagnostic
+
 pytest_plugins = ["examples", "stored_pictures"]
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -128,6 +130,21 @@ def no_disk_waits() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("os.fsync", lambda handle: None)
         patch.setenv("VIEWER_CACHE", "off")
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def messages_can_be_shown() -> Iterator[None]:
+    """Raise where a message is made whose sentence does not fit its values."""
+    # Tests often compare the values of a message alone, and would not notice.
+    made = Diagnostic.__post_init__
+
+    def shown(self: Diagnostic) -> None:
+        made(self)
+        assert self.message
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Diagnostic, "__post_init__", shown)
         yield
 
 
