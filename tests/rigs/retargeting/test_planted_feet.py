@@ -15,6 +15,7 @@ from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.driven_feet import plant_feet
@@ -353,21 +354,42 @@ def test_contacts_can_begin_and_end_gradually():
     assert (always.hold == 1.0).all()  # it neither begins nor ends within the motion
 
 
-def test_swinging_feet_do_not_sink_into_the_ground():
+def pitched_walk() -> SkeletonMotion:
+    """Return a walk whose toes point down while a foot swings."""
     rotations, path = walk(lift=8.0)
     frames = np.arange(N_WALK)
     for side, start in (("Left", 0), ("Right", 50)):
         phase = np.maximum((frames + start) % 100 - 60, 0) / 40.0
         pitch = matrices((1.0 * 64.0 * (phase * (1.0 - phase)) ** 3)[:, None] * X)
-        for part in ("Foot", "ToeBase"):  # the toes point down while the foot swings
+        for part in ("Foot", "ToeBase"):
             joint = NAMES.index(f"{side}{part}")
             rotations[:, joint] = pitch @ rotations[:, joint]
-    found = retarget(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    return written(t_pose(), rotations, path, rate=RATE)
+
+
+def test_swinging_feet_do_not_sink_into_the_ground():
+    found = retarget(pitched_walk(), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.is_better
     before, after = places(OTHER, found.clip), places(OTHER, clip)
     assert min(before[name][:, 1].min() for name in TOES) < -2.0
     assert min(after[name][:, 1].min() for name in TOES) > -0.3
+
+
+def test_swinging_feet_that_are_long_are_levelled_rather_than_lifted():
+    # Lifting the ankles alone would rotate the shins by 38 degrees.
+    figure = person(0.6, 0.5, 2.2, 1.0)
+    found = retarget(pitched_walk(), figure)
+    clip, changes = plant_feet(found, figure)
+    assert changes.is_better
+    before, after = places(figure, found.clip), places(figure, clip)
+    assert min(before[name][:, 1].min() for name in TOES) < -10.0
+    assert min(after[name][:, 1].min() for name in TOES) > -0.3
+    for side in SIDES:
+        shins = [at[f"{side}Foot_"] - at[f"{side}Leg_"] for at in (before, after)]
+        lengths = [np.linalg.norm(shin, axis=1) for shin in shins]
+        cosines = np.einsum("na,na->n", *shins) / (lengths[0] * lengths[1])
+        assert np.degrees(np.arccos(cosines.min())) < 20.0
 
 
 def detached(figure: Figure, is_turned: bool, above_feet: str = "Root") -> Figure:

@@ -5,9 +5,10 @@ during contacts, corrections that fade around them, legs solved in closed form. 
 that are too short; here the body is lowered and follows its feet, and no bone changes its length.
 
 During a contact, the ball or the heel of a foot stays in place and its sole on the ground; before
-and after, the correction fades in and out. Hips and knees rotate so that the ankles reach their
-targets, and the body is lowered if a leg is too short. If a knee then moves more suddenly than
-before, feet are held and released more gradually.
+and after, the correction fades in and out. Long feet that would touch the ground in the air are
+levelled. Hips and knees rotate so that the ankles reach their targets, and the body is lowered if a
+leg is too short. If a knee then moves more suddenly than before, feet are held and released more
+gradually.
 """
 
 from __future__ import annotations
@@ -134,6 +135,9 @@ _FLIGHT = 0.05
 # degrees: the straight leg of a walker is above the second, the leg of one who kneels below the
 # first.
 _STRAIGHT = (0.8, 0.95)
+
+# Number of shares of a tilt, 0 to 1, at which the rise of the sole is evaluated.
+_N_SHARES = 9
 
 # Percentage of the rows in which the feet of a motion without contacts are lowest.
 _LOWEST_ROWS = 2.0
@@ -262,7 +266,7 @@ def _attempt(
     # attempt gained (sliding, distance from the ground) and cost (sudden knees) is measured on the
     # result, by forward kinematics of the clip as it will be played.
     report(step, STEPS, "steps")
-    levelled = clip if plan.is_own else _levelled(clip, body, worlds, plan)
+    levelled = clip if plan.is_own else _clearing(_levelled(clip, body, worlds, plan), body, plan)
     report(step + 1, STEPS, "steps")
     planted, lowered = _planted(levelled, body, body.worlds(levelled), plan)
     report(step + 2, STEPS, "steps")
@@ -531,6 +535,64 @@ def _tilts(normals: Floats, up: Floats) -> Floats:
     return axes / np.maximum(sines, 1e-30) * np.arctan2(sines, (normals @ up)[..., None])
 
 
+def _clearing(clip: SampledClip, body: BodyLegs, plan: _FootPlan) -> SampledClip:
+    """Return a motion whose feet in the air are levelled as far as they would touch the ground."""
+    # A foot that swings points down. If it is longer than the source's relative to the leg, as a
+    # shoe of a chibi is, its tip would sink, and the leg would have to bend to lift the ankle: by
+    # up to 41 % of the leg's length, which turned shins by 64 degrees. A tilt that is reduced until
+    # the sole just clears the ground is less conspicuous. What a level foot still lacks is lifted,
+    # and so are feet that sink by no more than feet of a source do: their tilts are unchanged.
+    worlds, up = body.worlds(clip), plan.up
+    heights = body.heights(worlds, up)
+    shifts, _ = _foot_shifts(plan, body.feet(worlds), heights, body.straightness(worlds), 0)
+    ankles, toes = [leg.ankle for leg in body.legs], [leg.toe for leg in body.legs]
+    old = matrix_to_quaternion(unscaled(worlds[..., :3, :3]))
+    tilts = _tilts(_normals(old[:, ankles], body.level), up)
+    shares = np.zeros((len(body.legs), clip.n_rows, 1))
+    for foot in range(len(body.legs)):
+        if not plan.contacts[foot] or plan.feet[foot].toe is plan.feet[foot].heel:
+            continue
+        missing = plan.floor(foot) - heights[:, foot] - shifts[foot] @ up
+        sinks = np.flatnonzero(missing > _ROUNDING * plan.size)
+        found = _shares(body, foot, worlds[sinks], tilts[sinks, foot], missing[sinks], up)
+        deepest = float(missing.max(initial=0.0)) / (limits.SUNK * plan.size)
+        shares[foot, sinks, 0] = found * (1.0 - falling(np.array(deepest - 1.0)))
+    if not shares.any():
+        return clip
+    smooth = np.clip(_smoothed(plan, shares, np.ones(shares.shape[:2]), _LEVELS), 0.0, 1.0)
+    change = rotation_vector_to_quaternion(smooth.swapaxes(0, 1) * tilts)
+    new = np.stack([multiply(change, old[:, joints]) for joints in (ankles, toes)])
+    return _rotated(clip, body, old, new)
+
+
+def _shares(
+    body: BodyLegs, foot: int, worlds: Floats, tilts: Floats, missing: Floats, up: Floats
+) -> Floats:
+    """Return the smallest shares of tilts (N, 3) by which a foot's sole rises enough: (N,).
+
+    If none is enough, the one by which the sole is highest.
+    """
+    joints = np.unique(body.soles.movers[body.soles.feet == foot])
+    pivots = worlds[:, body.legs[foot].ankle, :3, 3]
+    shares, rises = np.linspace(0.0, 1.0, _N_SHARES), []
+    unturned = body.heights(worlds, up)[:, foot]
+    for share in shares:
+        turns = np.tile(np.eye(4), (len(worlds), 1, 1))
+        turns[:, :3, :3] = quaternion_to_matrix(rotation_vector_to_quaternion(share * tilts))
+        turns[:, :3, 3] = pivots - np.einsum("nab,nb->na", turns[:, :3, :3], pivots)
+        turned = worlds.copy()
+        turned[:, joints] = turns[:, None] @ worlds[:, joints]
+        rises.append(body.heights(turned, up)[:, foot] - unturned)
+    rise = np.array(rises)
+    is_enough = rise >= missing
+    last = np.where(is_enough.any(axis=0), is_enough.argmax(axis=0), rise.argmax(axis=0))
+    # Between two shares, the rise is interpolated.
+    rows, before = np.arange(len(worlds)), np.maximum(last - 1, 0)
+    low, high = rise[before, rows], rise[last, rows]
+    part = np.clip((missing - low) / np.maximum(high - low, 1e-30), 0.0, 1.0)
+    return shares[before] + part * (shares[last] - shares[before])
+
+
 def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> SampledClip:
     """Return a motion with new rotations of ankles and toes in the world, (2, N, L, 4)."""
     rotations, joints, parents = clip.rotations.copy(), body.chains.joints, body.chains.parents
@@ -564,10 +626,12 @@ def _foot_shifts(
     points: list[tuple[Floats, Floats]],
     heights: Floats,
     straight: Floats,
+    n_lifts: int = _LIFTS,
 ) -> tuple[list[Floats], Floats]:
     """Return translations of every foot, (N, 3) each, and of the body, (N, 3).
 
     ``heights`` (N, L): of the soles. ``straight`` (N, L): see ``BodyLegs.straightness``.
+    ``n_lifts``: passes that lift sinking feet.
     """
     # The body follows planted feet, so that straight legs need not bend. Feet and body depend on
     # each other: a foot in the air moves with the body, and the body follows the feet on the
@@ -594,7 +658,7 @@ def _foot_shifts(
     shifts = _shifts(plan, every, still)
     sway = _sway(plan, shifts, 1.0 - bent, still) + _shake(plan, shifts)
     sway += _shake(plan, [shift - sway for shift in _shifts(plan, every, sway)])
-    return _shifts(plan, every, sway, _LIFTS), sway
+    return _shifts(plan, every, sway, n_lifts), sway
 
 
 def _wanted(plan: _FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
