@@ -165,6 +165,8 @@ def test_arrays_without_names_and_with_two_roots(tmp_path):
         ({"J": PLACES, "parents": [2, -1]}, "parents: expected 3 numbers, found 2 int64"),
         ({"J": PLACES, "parents": [0.5, -1, 1]},
          "parents: expected joints from 0 to 2, found 0.5"),
+        ({"J": PLACES, "parents": [np.inf, -1, 1]},
+         "parents: expected joints from 0 to 2, found inf"),
         ({"J": PLACES, "bones": [[1, 2], [1, 3]]},
          "bones: expected joints from 0 to 2, found 3"),
         ({"J": PLACES, "bones": [[1, 2], [0, 2]]},
@@ -174,7 +176,7 @@ def test_arrays_without_names_and_with_two_roots(tmp_path):
         ({"J": PLACES[:0], "parents": np.zeros(0)},
          "J: expected at least one row, found none"),
         ({"positions": np.zeros((5, 3, 3)), "parents": [2, -1, 1]},
-         "expected positions of joints (J, 3) as J or joints or joint_positions, found the keys "
+         "expected positions of joints (J, 3) as J, joints or joint_positions, found the keys "
          "positions, parents"),
     ],
 )  # fmt: skip

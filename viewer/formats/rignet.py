@@ -33,7 +33,7 @@ from viewer.formats._archive.opening import is_archive
 from viewer.formats._archive.values import Archive, texts_in
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST, to_number
-from viewer.phrases import counted, listed, printable, quoted
+from viewer.phrases import counted, listed, one_of, printable, quoted
 from viewer.rigs.arrays import Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.hierarchy import cycle_members, depth_first
@@ -121,13 +121,12 @@ def _read_arrays(archive: Archive) -> Figure:
         raise archive.source.fault(
             "F002.predicted-joints: expected positions of joints (J, 3) as {expected}, found the "
             "keys {found}",
-            expected=" or ".join(_PLACES),
+            expected=one_of(_PLACES),
             found=listed([printable(key, 40) for key in archive.keys], 12),
         )
     places = finite_array(archive, key, (None, 3), "joints")
     if len(places) == 0:
         raise archive.fault("F002.no-rows: {item}: expected at least one row, found none", item=key)
-    places = np.nan_to_num(places)
     parents = _parents(archive, len(places))
     order = depth_first(parents)
     rows = np.argsort(order)
@@ -158,8 +157,10 @@ def _parents(archive: Archive, count: int) -> Ints:
                 joint=int(several[0]),
             )
     # SMPL's root has -1 as an unsigned integer.
-    is_root = np.isnan(given) | (given == -1.0) | (given == children) | (given >= _UNSIGNED)
-    outside = np.flatnonzero(~is_root & ~((given >= 0) & (given < count) & (given % 1.0 == 0.0)))
+    is_unsigned = (given >= _UNSIGNED) & np.isfinite(given)
+    is_root = np.isnan(given) | (given == -1.0) | (given == children) | is_unsigned
+    is_joint = (given >= 0) & (given < count) & (given == np.floor(given))
+    outside = np.flatnonzero(~is_root & ~is_joint)
     if len(outside):
         raise _no_joint(archive, key, count, float(given[outside[0]]))
     parents = np.full(count, -1, dtype=np.int32)
