@@ -58,7 +58,7 @@ from viewer.exporters import (
     sampled,
     suited_exporter,
 )
-from viewer.exporters._motion_paths import PERSON, is_together, motion_paths
+from viewer.exporters._motion_paths import PERSON, is_together, motion_paths, numbered_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
 from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
@@ -511,16 +511,7 @@ def _check_numbered(has_frames: bool, output: Path) -> None:
             f"{printable(output, 300)}: expected {', '.join(suffixes)} for one file per frame, "
             f"found {output.suffix.lower() or 'a folder'}"
         )
-    try:
-        name = output.name.replace(PERSON, "")
-        first, second = (name.format(frame=frame) for frame in (0, 1))
-    except (ValueError, KeyError, IndexError, AttributeError):
-        first = second = ""
-    if first == second:
-        raise ViewerError(
-            f"{printable(output, 300)}: expected a name with {{frame}}, such as walk_{{frame:05}}"
-            f"{output.suffix}, for one file per frame"
-        )
+    numbered_paths(output.with_name(output.name.replace(PERSON, "")), (0, 1))  # checks the name
 
 
 def _asks_one_pose(frames: Frames, output: Path, scene: Scene) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError
+from viewer.errors import ViewerError
 from viewer.exporters._exporter import Exporter, Part
 from viewer.exporters._gaps import file_spans
 from viewer.exporters._options import ExportOptions
@@ -71,12 +71,12 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     numbers = [int(frame) for frame in frames]
     try:
         files = [path.with_name(path.name.format(frame=number)) for number in numbers]
-    except (ValueError, KeyError, IndexError, AttributeError):
+    except (ValueError, LookupError, AttributeError, TypeError, MemoryError):
         files = []
     if len(set(files)) < len(numbers):
-        example = f"{printable(path.stem)}_{{frame:05}}{path.suffix}"
-        raise OutputError(
-            f"{printable(path, 300)}: expected a name with {{frame}}, as in {example}"
+        raise ViewerError(
+            f"{printable(path, 300)}: expected a name with {{frame}}, such as walk_{{frame:05}}"
+            f"{path.suffix}, for one file per frame"
         )
     return files
 

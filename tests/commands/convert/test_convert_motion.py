@@ -136,6 +136,8 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
     ("arguments", "message"),
     [
         (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, such as walk_"),
+        (["-o", "{frame[0]}.obj"], "{frame[0]}.obj: expected a name with {frame}, such as walk_"),
+        (["-o", "{frame:99999999999}.obj"], "99}.obj: expected a name with {frame}, "),
         (["-o", "w.bvh", "--frames", "2:1"], "--frames: expected A:B"),
         (["-o", "w.bvh", "--frames", "0:4:2"], "--frames: expected A:B"),
         (["-o", "w.xyz"], 'no exporter for ".xyz"; supported:'),
