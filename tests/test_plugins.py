@@ -570,12 +570,24 @@ def test_skinning_method_of_a_plugin_is_one_of_all(install, tmp_path):
         (("return moved,", "return moved * np.nan,"), "from deform, found others"),
         (("return moved,", "return 1 / 0,"), "cannot deform: ZeroDivisionError"),
         (("position = vec3(", "position = oops("), "the driver rejected a shader (skin/rejected"),
+        (
+            ('SHADER = """', 'SHADER = """#pragma needs oops\n'),
+            'no "oops" for #pragma needs; there are 3: lbs, dqs, mix',
+        ),
+        (
+            ('SHADER = """', 'SHADER = """#pragma needs rejected\n'),
+            'no "rejected" for #pragma needs; ',
+        ),
+        (
+            ('SHADER = """', 'SHADER = """\n#pragma include oops\n'),
+            'no "oops" for #pragma include; ',
+        ),
     ],
     ids=lambda value: str(value)[:20],
 )
 def test_error_of_a_skinning_method_names_its_package(changes, message, install, tmp_path, capsys):
     # A program is compiled once for each name, in all tests.
-    name = "rejected" if "oops" in changes[1] else "broken"
+    name = "rejected" if "oops" in changes[1] or "#pragma" in changes[1] else "broken"
     add_method(install, strongest_method().replace(*changes), name)
     picture = tmp_path / "a.png"
     options = ["--method", name, "--size", "64x64", "-o", str(picture)]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
+from viewer.near_names import name_hint
 from viewer.resources import resource
-from viewer.rigs.skinning import plugged_shader
+from viewer.rigs.skinning import METHODS, plugged_shader
 
 STORAGE_VERSION = 430
 """Version of OpenGL with storage buffers and compute shaders; crowds are drawn with them."""
@@ -71,6 +72,8 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     inner = plugged_shader(chunk) if folder == "skin" else None
     if inner is None:
         inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
+    else:
+        _check_pragmas(chunk, inner)
     needs = _NEEDS.match(inner)
     parts = [_included(name, files) for name in _INCLUDES.findall(inner)]
     for name in needs[1].split() if needs else []:
@@ -84,6 +87,21 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     parts.append(f"#line {len(files) * LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")
     return "".join(parts)
+
+
+def _check_pragmas(method: str, text: str) -> None:
+    """Raise the error of a plug-in whose shader needs or includes what this program lacks."""
+    plugin, needs = METHODS[method].plugin, _NEEDS.match(text)
+    assert plugin is not None
+    methods = [name for name, row in METHODS.items() if row.plugin is None]
+    includes = [path.stem for path in resource("shaders", "include").glob("*.glsl")]
+    for pragma, names, known in (
+        ("needs", needs[1].split() if needs else [], methods),
+        ("include", _INCLUDES.findall(text), sorted(includes)),
+    ):
+        for name in names:
+            if name not in known:
+                raise plugin.error(f'no "{name}" for #pragma {pragma}; {name_hint(name, known)}')
 
 
 def embedded_text(name: str, chunk: str = "", defines: tuple[str, ...] = ()) -> str:
