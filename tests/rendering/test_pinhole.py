@@ -166,6 +166,18 @@ def test_camera_facing_away_can_orbit():
         assert camera.distance > 0.0 and np.isfinite(camera.view_matrix()).all()
 
 
+def test_camera_almost_at_the_centre_can_orbit():
+    """The distance is too small to be divided by."""
+    camera = camera_from_view(camera_view(translation=[0.0, 0.0, 1e-12]), (640, 480), "y")
+    assert camera.distance == 1.0
+
+
+def test_upside_down_images_have_the_same_field_of_view():
+    upright = camera_from_view(camera_view(), (640, 480), "y")
+    flipped = K * [[1.0], [-1.0], [1.0]]
+    assert camera_from_view(camera_view(intrinsic=flipped), (640, 480), "y").fov == upright.fov
+
+
 def test_wide_images_keep_the_horizontal_field_of_view():
     camera = camera_from_view(camera_view(), (480, 480), "y")
     # The 640 columns fit into the width, so 640 rows are visible.

@@ -41,7 +41,8 @@ VIEWS: dict[NamedView, tuple[float, float]] = {
 _USUAL_AZIMUTH = 35.0  # initial angle from the front
 
 _MARGIN = 1.08  # margin around a framed figure
-_SMALLEST = 1e-9  # minimum distance, for framing a single point
+SMALLEST = 1e-9
+"""Minimum distance, for framing a single point, and minimum field of view in degrees."""
 
 
 @checked
@@ -51,13 +52,13 @@ class Camera:
 
     target: Floats = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
     """(3,). Point that the camera orbits, scene space."""
-    distance: float = setting(3.0, limits=(_SMALLEST, math.inf))
+    distance: float = setting(3.0, limits=(SMALLEST, math.inf))
     """Distance from eye to target, scene units."""
     azimuth: float = _USUAL_AZIMUTH
     inclination: float = 15.0
     """Degrees about the up axis, and above the horizon. At 0, 0, the camera looks along -z if y is
     up, along +y if z is up."""
-    fov: float = setting(35.0, limits=(_SMALLEST, 180.0))
+    fov: float = setting(35.0, limits=(SMALLEST, 180.0))
     """Vertical field of view, degrees."""
     orthographic: bool = False
     """Whether the projection is parallel, with the same height at the target."""
@@ -247,10 +248,12 @@ def camera_from_view(
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
     distance = float((place - middle) @ backward)
-    if distance <= _SMALLEST:  # the object is behind the camera
-        distance = float(np.linalg.norm(place - middle)) or 1.0
+    if distance <= SMALLEST:  # the object is behind the camera
+        distance = float(np.linalg.norm(place - middle))
+        distance = distance if distance > SMALLEST else 1.0
     x, y, z = backward if up == "y" else (backward[0], backward[2], -backward[1])
-    focal = float(view.intrinsic[1, 1] / view.intrinsic[2, 2])
+    # Negative where the rows of the images are counted upwards.
+    focal = abs(float(view.intrinsic[1, 1] / view.intrinsic[2, 2]))
     return Camera(
         target=place - distance * backward,
         distance=distance,
@@ -288,7 +291,7 @@ def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0)
     needed = np.maximum(np.abs(across) / wide, np.abs(upward) / high)
     # Perspective enlarges near points, so they need a larger distance.
     distance = float((needed if camera.orthographic else needed + near).max(initial=0.0))
-    camera.distance = distance if distance > _SMALLEST else 1.0
+    camera.distance = distance if distance > SMALLEST else 1.0
 
 
 def orbit(camera: Camera, azimuth: float, inclination: float) -> None:
@@ -306,7 +309,7 @@ def pan(camera: Camera, across: float, upward: float) -> None:
 
 def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     """Scale the camera's distance, in place, and keep the point under the pointer."""
-    distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
+    distance = min(max(camera.distance * factor, SMALLEST), 1e12)
     # At the ends of the range, the factor is 1, so the camera does not pan.
     factor = distance / camera.distance
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))

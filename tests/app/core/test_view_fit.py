@@ -16,10 +16,10 @@ from viewer.app.core.view_frame import ViewFrame, view_frame
 from viewer.app.curves.editing import place_key
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import SMALLEST, Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording
-from viewer.rigs.scene import pose_actors, scene_points
+from viewer.rigs.scene import Actor, Scene, pose_actors, scene_points
 
 streaming = test_timeline.streaming  # the fixture of the timeline tests
 ROOM = 1.08  # margin around a fitted figure
@@ -50,6 +50,12 @@ def wide(drive, tmp_path):
     hand.state.framing.restart()
     hand.step(2)
     return hand
+
+
+def test_scene_can_be_smaller_than_the_smallest_distance(drive):
+    corners = 1e-14 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    hand = drive(scene=Scene([Actor(viewer.figure(corners, [[0, 1, 2]]))]))
+    assert (hand.state.error, hand.state.camera.distance) == ("", SMALLEST)
 
 
 def test_first_view_fits_between_the_panels(wide):

@@ -22,7 +22,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.loading import MotionSettings
-from viewer.rendering.camera import Camera, front_azimuth, orbit
+from viewer.rendering.camera import SMALLEST, Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Legend
 from viewer.rigs.arrays import Floats
@@ -210,7 +210,8 @@ class AppState:
         """Keep the camera close enough to the scene for the precision of float32."""
         size = box_size(self.box) or 1.0
         camera, center = self.camera, self.box.mean(axis=0)
-        camera.distance = min(max(camera.distance, 1e-5 * size), _FARTHEST * size)
+        farthest = max(_FARTHEST * size, SMALLEST)
+        camera.distance = min(max(camera.distance, 1e-5 * size), farthest)
         away = camera.target - center
         length = float(np.linalg.norm(away))
         if length > _FARTHEST * size:

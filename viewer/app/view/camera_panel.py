@@ -20,7 +20,7 @@ from viewer.app.core.widgets import (
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.phrases import capitalized, printable
-from viewer.rendering.camera import VIEWS, NamedView, front_azimuth, look_from
+from viewer.rendering.camera import SMALLEST, VIEWS, NamedView, front_azimuth, look_from
 from viewer.rendering.camera_views import image_notes, lens_notes
 from viewer.rigs.arrays import Floats
 from viewer.rigs.inspection.front import WantedFront, front_axes
@@ -40,7 +40,7 @@ def draw(state: AppState) -> None:
     size = box_size(state.box) or 1.0
     digits = "%.3g" if size < 0.1 or size > 1e4 else "%.2f"  # enough for the figure's unit
     distance = slider(state, "Distance", camera.distance, 0.05 * size, 20.0 * size, digits, _LOG)
-    camera.distance = max(distance, 1e-9)
+    camera.distance = max(distance, SMALLEST)
     camera.azimuth = slider(state, "Azimuth", camera.azimuth, -180.0, 180.0, "%.1f\N{DEGREE SIGN}")
     camera.inclination = slider(
         state, "Inclination", camera.inclination, -90.0, 90.0, "%.1f\N{DEGREE SIGN}", _CLAMP
