@@ -35,9 +35,6 @@ FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
-# Collecting creates few objects that are not kept until the end of the run.
-gc.disable()
-
 # Every run tries the same examples, without a time limit.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile("fixed")
@@ -70,6 +67,12 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     for report in reports:
         item.ihook.pytest_runtest_logreport(report=report)
     return True
+
+
+def pytest_collection() -> None:
+    # Collecting creates few objects that are not kept until the end of the run. The controller of
+    # several workers collects nothing: its own function ends the search for others.
+    gc.disable()
 
 
 def pytest_collection_finish() -> None:
