@@ -55,10 +55,9 @@ def body_drive(
     """Return a body's motion as one that drives figures; ``up``: its world's axis, y, z, -y, -z."""
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(
-        SkeletonMotion(moving, clip),
+        SkeletonMotion(moving, clip, hangs=up.startswith("-")),
         joint_map=joint_map,
         keeps_up=True,
         plants_feet=plants_feet,
         keeps_hands=keeps_hands,
-        hangs=up.startswith("-"),
     )

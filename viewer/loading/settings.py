@@ -138,7 +138,6 @@ class MotionSettings:
             self.joint_map,
             plants_feet=self.feet,
             keeps_hands=self.hand_contact,
-            hangs=motion.hangs,
         )
 
 

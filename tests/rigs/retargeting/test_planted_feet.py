@@ -248,14 +248,16 @@ def test_motions_of_two_frames_or_with_gaps_are_supported():
         assert (clip.timing.present == timing.present).all()
 
 
-def test_upside_down_world_results_in_the_same_feet():
+@pytest.mark.parametrize("plants", [True, False])
+def test_upside_down_world_results_in_the_same_feet(plants):
     rotations, path = walk()
     over = axis_rotations(0, np.asarray(np.pi))
     # At rest the hips are at a height of 100, which is the origin of their path.
     moved = (path + 100.0 * Y) @ over.T - 100.0 * Y
     motion = written(t_pose(), over @ rotations, moved, rate=RATE)
-    straight, _ = driven_clip(Drive(written(t_pose(), rotations, path, rate=RATE)), OTHER)
-    turned, _ = driven_clip(Drive(motion, hangs=True), OTHER)
+    upright = written(t_pose(), rotations, path, rate=RATE)
+    straight, _ = driven_clip(Drive(upright, plants_feet=plants), OTHER)
+    turned, _ = driven_clip(Drive(replace(motion, hangs=True), plants_feet=plants), OTHER)
     first, second = places(OTHER, straight), places(OTHER, turned)
     assert_allclose(second["LeftToeBase_"] @ over, first["LeftToeBase_"], atol=1e-6)
 

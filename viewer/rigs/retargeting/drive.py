@@ -26,7 +26,5 @@ class Drive:
     """Whether feet stay planted while the source's feet are on the ground."""
     keeps_hands: bool = True
     """Whether hands stay at the body while the source's hands are at its own."""
-    hangs: bool = False
-    """Whether the up axis of the motion points down."""
     finish: Callable[[SampledClip], SampledClip] | None = None
     """Post-processes the resulting clip, as clean-up does."""

@@ -36,10 +36,10 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     found = retarget(drive.motion, body, chosen, drive.source_rest)
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
-        clip, changes = plant_feet(found, body, drive.hangs)
+        clip, changes = plant_feet(found, body)
         notes = notes + feet_notes(changes, found, body)
     if drive.keeps_hands:
-        clip, kept = keep_hands(found, clip, body, drive.hangs)
+        clip, kept = keep_hands(found, clip, body)
         notes = notes + hand_notes(kept, found, body)
     if limbs is not None:
         clip = limbs.original_clip(clip, figure)

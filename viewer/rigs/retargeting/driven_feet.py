@@ -35,13 +35,11 @@ _LOW_GROUND = 0.2
 _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
-def plant_feet(
-    found: Retargeted, figure: Figure, hangs: bool = False
-) -> tuple[SampledClip, PlantedFeet | None]:
+def plant_feet(found: Retargeted, figure: Figure) -> tuple[SampledClip, PlantedFeet | None]:
     """Plant a driven figure's feet; no changes without legs or if proportions are the source's."""
     pairs = _leg_pairs(found, figure)
     rest_up = axis_vector(figure.up)
-    up = -rest_up if hangs else rest_up
+    up = -rest_up if found.source.hangs else rest_up
     clip = in_frame_order(found.clip)
     body = body_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
     if body is None or body.size <= 0.0 or clip.n_rows == 0:
@@ -52,7 +50,7 @@ def plant_feet(
     source = in_frame_order(found.source.clip)
     worlds = body.worlds(clip)
     own = body.feet_from_ankles(worlds)
-    feet = _source_paths(found, source, pairs, own, rest_up, body.size)
+    feet = _source_paths(found, source, pairs, own, (rest_up, up), body.size)
     planted, changes = plant(clip, body, worlds, up, feet)
     return (planted if changes.is_better or changes.raised else found.clip), changes
 
@@ -111,10 +109,14 @@ def _source_paths(
     clip: SampledClip,
     pairs: list[_LegPair],
     vectors: list[tuple[Floats, Floats]],
-    up: Floats,
+    ups: tuple[Floats, Floats],
     size: float,
 ) -> list[FootPath]:
-    """Return the source's feet in the figure's axes and unit, shaped as the figure's if unknown."""
+    """Return the source's feet in the figure's axes and unit, shaped as the figure's if unknown.
+
+    ``ups``: the up axes of the rest pose and of the frames, (3,) each.
+    """
+    rest_up, up = ups
     skeleton = found.source.figure.require_skeleton()
     chains = chains_to(
         skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
@@ -132,14 +134,14 @@ def _source_paths(
             ball = ball if toe != ankle else place + own[0]
             result.append(FootPath(ball, ball, above))
             continue
-        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
+        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ rest_up
         length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
         linear = rest[ankle, :3, :3]
         if not (0.0 < height < _STEEP * length and is_solvable(linear)):
             result.append(FootPath(place + own[0], place + own[1], above))
             ankles.append(place @ up)
             continue
-        upward = np.linalg.solve(linear, found.to_target.T @ up)
+        upward = np.linalg.solve(linear, found.to_target.T @ rest_up)
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
         result.append(FootPath(ball, heel @ axes.T, above))
     if len(ankles) < len(pairs):

@@ -150,12 +150,9 @@ class _Body:
 
 
 def keep_hands(
-    found: Retargeted, clip: SampledClip, figure: Figure, hangs: bool = False
+    found: Retargeted, clip: SampledClip, figure: Figure
 ) -> tuple[SampledClip, KeptHands | None]:
-    """Return a clip of a driven figure with hands that touch its body; None if none were moved.
-
-    ``hangs``: whether the up axis of the motion points down.
-    """
+    """Return a clip of a driven figure with hands that touch its body; None if none were moved."""
     skeleton, source = figure.require_skeleton(), found.source.figure.require_skeleton()
     mine = _driven_joints(found)
     if not mine or not clip.n_rows:
@@ -190,7 +187,7 @@ def keep_hands(
         _within_reach(body, arm, _beyond_slack(shift, slack))
         for arm, shift in zip(_ARMS, shifts, strict=True)
     ]
-    up = -axis_vector(figure.up) if hangs else axis_vector(figure.up)
+    up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
     given_way = np.zeros((len(_ARMS), *shifts[0].shape))
     if points is not None and differs:
         rests_on = _rests_on(body, other, together)

@@ -165,6 +165,7 @@ class _Job:
     matches: Matches
     to_target: Floats  # (3, 3), from the source's axes to the figure's
     is_same: bool
+    hangs: bool  # whether the up axis of the frames, not that of the rest poses, points down
 
 
 def _job(
@@ -175,7 +176,7 @@ def _job(
     to_target = up_rotation(motion.figure.up, up)
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
-    return _Job(motion.clip, source, target, rests, matches, to_target, is_same)
+    return _Job(motion.clip, source, target, rests, matches, to_target, is_same, motion.hangs)
 
 
 def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
@@ -332,7 +333,8 @@ def _shifts(
         rotation = quaternion_to_matrix(rotations[:, joint])
         linear = linear @ rotation * job.target.rest_scales[joint]
     wanted = scale * places[:, job.matches.partners[anchor]] @ job.to_target.T
-    shifts[:, path[0]] = wanted + _ground_offset(job, scale) - reached
+    offset = _ground_offset(job, scale)
+    shifts[:, path[0]] = wanted + (-offset if job.hangs else offset) - reached
     return shifts, _dropped_translations(job)
 
 
