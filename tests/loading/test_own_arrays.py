@@ -85,6 +85,14 @@ def test_parents_may_be_those_of_a_kintree_table(kind):
     assert square(parents=parents).skeleton.parents.tolist() == [-1, 0]
 
 
+def test_parents_in_bytes_may_be_above_127():
+    parents = np.arange(-1, 199).astype(np.uint8)
+    weights = np.zeros((4, 200))
+    weights[:, 0] = 1.0
+    found = square(joints=np.zeros((200, 3)), parents=parents, weights=weights, names=())
+    assert found.skeleton.parents.tolist() == [*range(-1, 199)]
+
+
 def test_absent_frames_are_not_a_number():
     turns = np.zeros((3, 2, 3))
     actor = viewer.animate(square(), turns, present=[True, False, True])

@@ -295,9 +295,10 @@ def _skeleton(joints: Floats, parents: ArrayLike | None, names: Sequence[str]) -
             f"parents: expected integers of shape ({count},), found {above.dtype} of shape "
             f"{above.shape}"
         )
-    # Unsigned integers, as in ``kintree_table`` of body models, hold -1 as their largest number.
+    # In unsigned integers, as in ``kintree_table`` of body models, -1 is the largest number.
     if above.dtype.kind == "u":
-        above = above.astype(f"i{above.dtype.itemsize}")
+        is_root = above == np.iinfo(above.dtype).max
+        above = np.where(is_root, -1, above.astype(np.int64))
     late = np.flatnonzero((above >= np.arange(count)) | (above < -1))
     if len(late):
         joint = int(late[0])
