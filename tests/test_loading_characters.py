@@ -1,5 +1,6 @@
 """Motions of bodies and other figures retargeted to characters with different joints."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -314,6 +315,22 @@ def test_end_sites_of_forearms_and_shins_without_hands_and_feet_are_followed(
     (driven,) = [note for note in scene.diagnostics if note.key.startswith("F007.joints-matched")]
     # Hips, spine and four joints of the arms and legs each, with their ends.
     assert driven.values["n"] == (14 if is_wrist else 12)
+
+
+@pytest.mark.parametrize("prefix", ["", "DEF-"])
+def test_figure_that_has_no_hands_and_feet_either_is_driven_without_doubts(tmp_path, prefix):
+    """Joints for End Sites made the figure of the same skeleton another one, with three notes."""
+    hero, path = tmp_path / "hero.glb", tmp_path / "a.bvh"
+    text = HANDLESS.format(0.2, 0.15)
+    path.write_text(bvh_of(text))
+    rows = [row for row in text.strip("\n").split("\n") if row.split()[0] != "end"]
+    table = "\n".join(re.sub(r"(\w+)", rf"{prefix}\1", row, count=1) for row in rows)
+    hero.write_bytes(character_of(table).glb())
+    scene = load(path, motion=MotionSettings(model=hero, feet=False))
+    (driven,) = [note for note in scene.diagnostics if note.key.startswith("F007.joints-matched")]
+    assert driven.values["n"] == 10
+    keys = {note.key.partition(":")[0] for note in scene.diagnostics}
+    assert not keys & {"F007.joints-without-partner", "C018.limbs-unknown"}
 
 
 def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tmp_path):

@@ -23,6 +23,9 @@ _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbo
 
 _Names = tuple[tuple[str, ...], tuple[str, ...]]  # names of the source, and of the target
 
+TIPS = {"wrist": ":hand", "ankle": ":foot"}
+"""Ends of the names of joints that stand for the End Sites of forearms and shins."""
+
 
 @dataclass(frozen=True, slots=True)
 class Matches:
@@ -127,12 +130,25 @@ def _comparable(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _has_same_hierarchy(source: Skeleton, target: Skeleton, plain: _Names) -> bool:
-    """Return whether all joints have equal names and parents, in any order."""
+    """Return whether all joints have equal names and parents, in any order; tips may be missing."""
     trees = []
     for skeleton, names in zip((source, target), plain, strict=True):
         above = [names[parent] if parent >= 0 else "" for parent in skeleton.parents]
         trees.append(dict(zip(names, above, strict=True)))
-    return len(trees[0]) == source.n_joints and trees[0] == trees[1]
+    if len(trees[0]) != source.n_joints:
+        return False
+    tips = {plain[0][joint] for joint in _tips(source)} - {*trees[1]}
+    return {name: above for name, above in trees[0].items() if name not in tips} == trees[1]
+
+
+def _tips(skeleton: Skeleton) -> set[int]:
+    """Return joints that stand for the End Sites of their parents."""
+    names, parents = skeleton.names, skeleton.parents
+    return {
+        joint
+        for joint, parent in enumerate(parents)
+        if parent >= 0 and names[joint] in [names[parent] + tip for tip in TIPS.values()]
+    }
 
 
 def _match_equal(partners: Ints, names: _Names, meanings: _Names | None) -> None:
@@ -184,7 +200,7 @@ def _misfit(
 
 
 def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str], list[str]]:
-    used = set(partners.tolist())
+    used = {*partners.tolist(), *_tips(source)}
     unused = [label for j, label in enumerate(joint_labels(source)) if j not in used]
     idle = joint_labels(target)
     return unused, [idle[j] for j in np.flatnonzero(partners < 0)]

@@ -32,7 +32,7 @@ from viewer.rigs.kinematics import joint_worlds
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
 from viewer.rigs.retargeting.joint_map import JointMap
-from viewer.rigs.retargeting.joint_matches import Matches, match_joints
+from viewer.rigs.retargeting.joint_matches import TIPS, Matches, match_joints
 from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
 from viewer.rigs.retargeting.rest_alignment import (
     RestPose,
@@ -214,7 +214,7 @@ def with_tips(motion: SkeletonMotion) -> SkeletonMotion:
             continue
         owners.append(joint)
         tips.append(tip)
-        names.append(f"{skeleton.names[joint]}:{'hand' if end.endswith('wrist') else 'foot'}")
+        names.append(skeleton.names[joint] + TIPS[end.partition("_")[2]])
     if not owners:
         return motion
     added = len(owners)
@@ -531,8 +531,8 @@ def _limbs_at_rest(
             them=agree(len(unmatched), "it", "them"),
             remedy=remedy,
         )
-    if unknown:
-        idle = [mine[j] for j in np.flatnonzero(matches.partners < 0) if not matches.names[j]]
+    idle = [mine[j] for j in np.flatnonzero(matches.partners < 0) if not matches.names[j]]
+    if unknown and idle:
         warn(
             "C018.limbs-unknown: no joint of {figure} is recognised as {parts}: {motion} "
             "cannot move {them} (at rest: {idle}); match {them} in the Joint match panel{remedy}",
