@@ -45,6 +45,8 @@ from viewer.linting import (
 )
 from viewer.linting.fixes import FIXES, fix_scene, motions
 from viewer.linting.fixes import weights as weights_fix
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
@@ -292,6 +294,26 @@ def test_what_was_fixed_on_reading_is_said(tmp_path, capsys):
     assert run(command) == 0
     (line,) = (one for one in capsys.readouterr().out.splitlines() if "W001" in one)
     assert line.startswith("W001 fixed on reading: ") and "weights of 3 vertices" in line
+
+
+def test_open_parts_are_reversed_with_closed_ones_if_their_normals_oppose_them():
+    """Of two squares with normals that point up, the triangles of the first one face down."""
+    closed, corners = inside_out().mesh, np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]])
+    squares = closed.n_vertices + np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    faces = squares.copy()
+    faces[:2] = faces[:2, ::-1]
+    mesh = Mesh(
+        np.concatenate([closed.positions, 5.0 + corners, 8.0 + corners]),
+        np.concatenate([closed.normals, np.tile([0.0, 1.0, 0.0], (8, 1))]),
+        np.concatenate([closed.triangles, faces]),
+    )
+    found = {one.code: one for one in meshes.check(Subject(Actor(Figure("a", mesh))))}
+    assert "2 parts with 38 triangles are inside out" in found["M003"].message
+    assert found["M003"].triangles.tolist() == [*range(38)]
+    right = fixed(Figure("a", mesh), meshes)[0].mesh
+    np.testing.assert_array_equal(right.triangles[36:], squares)
+    np.testing.assert_array_equal(right.normals[-8:], mesh.normals[-8:])
+    np.testing.assert_array_equal(right.normals[:-8], -closed.normals)
 
 
 def test_convert_fixes_and_prints_changes(tmp_path, capsys):
