@@ -283,3 +283,15 @@ def test_joints_are_where_their_landmarks_are_in_the_target():
     with pytest.raises(RigError, match="expected 3 or more pairs, as no limbs were found, found 2"):
         few = AlignmentSettings(landmarks=pairs[:2], samples=100)
         transfer(figure, rest, target, TransferSettings(alignment=few))
+
+
+def test_joint_that_a_landmark_places_outside_the_target_is_reported():
+    # Nothing of the target is around the joint, so its surface says nothing about the joint.
+    figure, rest = arm(), rest_pose(arm().skeleton)
+    own = joint_matrices(figure, rest)[:, :3, 3]
+    ends = figure.mesh.positions[[0, 1, 2, -1]]
+    pairs = np.stack([np.stack([*own, *ends])] * 2, axis=1)
+    for away, expected in ((0.0, ()), (1.5, (1,))):
+        pairs[1, 1] = own[1] + [away, 0.0, 0.0]
+        how = TransferSettings(alignment=AlignmentSettings(landmarks=pairs, samples=100))
+        assert transfer(figure, rest, figure.mesh, how).outside == expected

@@ -111,6 +111,9 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
     report_fraction(0.95, "checking the result")
     joints = joint_matrices(figure, rest.pose)[:, :3, 3]
+    if transferred is not None:
+        # A joint that was placed belongs in the mesh even if no surface around it was found.
+        transferred = transferred | np.isin(np.arange(len(joints)), list(pinned))
     out = newly_outside(template, pose, posed, target, joints, transferred)
     residual = residual_of(figure, rest.pose, np.eye(4), target)
     with part_of_work(span=(0.95, 1.0)):
