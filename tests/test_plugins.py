@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import pickle
 import re
 import runpy
 import sys
@@ -530,6 +531,11 @@ def test_skinning_method_of_the_manual_deforms_and_draws_alike(install, ctx):
             place = (palette[strongest] @ [*place, 1.0])[:3]
         np.testing.assert_allclose(found[vertex], place, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    stored = pickle.dumps(how)
+    del METHODS["strongest"]  # as in another process
+    np.testing.assert_array_equal(viewer.deform(figure, pose, pickle.loads(stored))[0], found)
+    with pytest.raises(KeyError):
+        METHODS["weakest"]
     programs = Programs(ctx)
     posed = PosedMesh(ctx, programs, MeshBuffers(ctx, figure, []))
     posed.update(pose, how)

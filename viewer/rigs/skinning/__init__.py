@@ -66,6 +66,12 @@ class _Methods(dict[str, Method]):
             self[name] = _plugged_method(plugin)
         return True
 
+    def __missing__(self, name: str) -> Method:
+        # Unpickled options of another process are not checked, so nothing has looked for theirs.
+        if name not in self:
+            raise KeyError(name)
+        return self[name]
+
 
 def _plugged_method(plugin: Plugin) -> Method:
     """Return the row of a plug-in's method."""
