@@ -1,5 +1,7 @@
 """Skeletons that networks predict, as text and as arrays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -153,6 +155,18 @@ def test_arrays_without_names_and_with_two_roots(tmp_path):
     skeleton = viewer.load(path).actors[0].figure.skeleton
     assert skeleton.names == ("joint_0", "joint_1", "joint_2")
     assert skeleton.parents.tolist() == [-1, -1, 1]
+
+
+def test_skeleton_of_our_own_arrays_has_their_axis_and_unit(tmp_path):
+    (tmp_path / "rig.txt").write_text(GOOD)
+    actor = viewer.load(tmp_path / "rig.txt").actors[0]
+    for up, unit in (("z", "cm"), ("y", "")):
+        path = tmp_path / f"{up}.npz"
+        viewer.export(viewer.Actor(replace(actor.figure, up=up, unit=unit)), path)
+        (again,) = viewer.load(path).actors
+        assert (again.figure.up, again.figure.unit) == (up, unit)
+        assert_allclose(again.joints(), actor.joints(), atol=1e-12)
+    assert again.figure.facts == (("not needed", "name, own_numbers, shape_weights, world"),)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,12 @@ A text, or an archive of arrays::
     parents (J,)     any order; a root has -1, None or its own index
     bones (N, 2)     parent and child: instead of parents
     names (J,)       or "joint_names"; optional
+    up, unit         as in the arrays that this program writes; optional
 
 Names in a text are words; spaces in them are kept. Lines may be in any order; blank ones and
 comments (``#``) are ignored. Positions are those of the joints in the space of a mesh: y is up, and
-the unit is unknown. Meshes in archives and weights are not read; ``viewer rig --skeleton`` computes
-new weights for any mesh.
+the unit is unknown, unless an archive states them. Meshes in archives and weights are not read;
+``viewer rig --skeleton`` computes new weights for any mesh.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from viewer.rigs.arrays import Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.hierarchy import cycle_members, depth_first
 from viewer.rigs.skeleton import ball_skeleton
+from viewer.rigs.units import METRES
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORDS = {b"joints": "a name and 3 numbers", b"root": "a name", b"hier": "a parent and a child"}
@@ -133,7 +135,15 @@ def _read_arrays(archive: Archive) -> Figure:
     above = np.where(parents >= 0, rows[parents], -1)[order]
     names = _names(archive, len(places))
     skeleton = ball_skeleton(tuple(names[joint] for joint in order), above, places[order])
-    return Figure(archive.source.path.stem, skeleton=skeleton)
+    up, unit = archive.plain_text("up"), archive.plain_text("unit")
+    others = [printable(key, 40) for key in sorted(archive.unread())]
+    return Figure(
+        archive.source.path.stem,
+        skeleton=skeleton,
+        up="z" if up == "z" else "y",
+        unit=unit if unit in METRES else "",
+        facts=(("not needed", listed(others, 12)),) if others else (),
+    )
 
 
 def _parents(archive: Archive, count: int) -> Ints:
