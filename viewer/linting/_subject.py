@@ -313,7 +313,7 @@ def _track(subject: Subject) -> Track | None:
     is_bound = figure.is_attached and not subject.lacks("bindings")
     stance = _stance(figure, clip)
     legs = animal_legs(skeleton.parents, rest_joints(stance), axis_vector(figure.up))
-    # The tips of insects' legs are drawn in the ground.
+    # Only quadrupeds: insects are modelled with the tips of their legs in the ground.
     legs = legs if len(legs) == _QUADRUPED else []
     soles = None
     if count:
