@@ -416,9 +416,11 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
     omitted += [
         note(lacking, figure=part.actor.name) for part in selection.parts if part not in able
     ]
-    if scene is not None and scene.views and not kind.stores_cameras:
+    # A file for each actor has no cameras.
+    together = is_together(kind, path, options)
+    if scene is not None and scene.views and not (together and kind.stores_cameras):
         omitted.append(_cameras_note(scene.views))
-    if is_together(kind, path, options):
+    if together:
         parts = [part if scene is None else _placed(scene, part) for part in there]
         return _Plan(key, [(Selection(parts, scene), path)], omitted)
     groups = []

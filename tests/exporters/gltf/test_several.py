@@ -117,8 +117,11 @@ def test_cameras_are_read_back(tmp_path):
     assert_allclose(front.rotation, turn, atol=1e-12)
     assert_allclose(front.translation, view.translation, atol=1e-12)
     selection = Selection([Part(Actor(two_parts()))], Scene([], views=(view, lens)))
-    texts = [str(note) for note in export(selection, tmp_path / "seen.obj")]
-    assert "2 cameras are not written: front, lens" in texts
+    lost = "2 cameras are not written: front, lens"
+    for name, is_lost in (("seen.obj", True), ("seen_{person}.glb", True), ("all.glb", False)):
+        texts = [str(note) for note in export(selection, tmp_path / name)]
+        assert (lost in texts) == is_lost
+    assert viewer.load(tmp_path / "seen_1.glb").views == ()
 
 
 def test_animations_without_effect_are_reported(tmp_path):
