@@ -113,6 +113,18 @@ def check_frames(browser, animation, how, frames, index=0):
         assert np.linalg.norm(found - wanted, axis=1).max() <= EXACT * size, frame
 
 
+@needs_chromium
+def test_vertices_are_those_of_the_pose_in_which_they_were_asked_for(browser, tmp_path):
+    (animation,), _ = write(tmp_path / "a.html", moving(tangle()))
+    browser.open(tmp_path / "a.html")
+    browser.run("viewer.seek(0.2).then(() => null)")
+    asked = "const asked = page.vertices(0); page.seek(0.4); page.pose()"
+    found = browser.run(
+        f"viewer.ready.then(async page => {{ {asked}; return (await asked).positions; }})"
+    )
+    assert_allclose(found, positions_at(browser, 0.2), atol=1e-12)
+
+
 def scales_of(figure, n_frames=5):
     random = np.random.default_rng(8)
     return random.uniform(0.6, 1.5, size=(n_frames, figure.skeleton.n_joints, 3))

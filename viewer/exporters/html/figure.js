@@ -245,10 +245,11 @@ class Figure {
 
   // Positions and normals (V, 3) of the figure's vertices in its own space.
   async posedVertices() {
+    // The figure may be posed again while its rows are read.
+    const { model, center } = this;
     const rows = await this.readPosed(), positions = [], normals = [];
-    const [scale, offset] = [this.model[0], this.model.slice(12, 15)];
     this.sources.forEach((v, row) => {
-      positions[v] = [0, 1, 2].map((i) => scale * (rows[6 * row + i] + this.center[i]) + offset[i]);
+      positions[v] = [0, 1, 2].map((i) => model[0] * (rows[6 * row + i] + center[i]) + model[12 + i]);
       normals[v] = [...rows.subarray(6 * row + 3, 6 * row + 6)];
     });
     return { positions, normals };
