@@ -115,7 +115,7 @@ def check_frames(browser, animation, how, frames, index=0):
 
 @needs_chromium
 def test_vertices_are_those_of_the_pose_in_which_they_were_asked_for(browser, tmp_path):
-    (animation,), _ = write(tmp_path / "a.html", moving(tangle()))
+    write(tmp_path / "a.html", moving(tangle()))
     browser.open(tmp_path / "a.html")
     browser.run("viewer.seek(0.2).then(() => null)")
     asked = "const asked = page.vertices(0); page.seek(0.4); page.pose()"
