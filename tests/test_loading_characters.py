@@ -11,6 +11,7 @@ from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.app.files.files import Loader
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, begin, capturing, load, read_files
@@ -256,6 +257,24 @@ def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
     assert_allclose(paths[0], [0, -1, 0], rtol=0, atol=1e-9)
     forward = [0, -1, 0] if is_named else [0, 0, 1]  # the up axis of the scene
     assert_allclose(paths[1], legs[1] / legs[0] * np.array(forward), rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["file", "capture"])
+@pytest.mark.parametrize("table", [RIGGED, None], ids=["body names", "no joints"])
+def test_people_opened_in_the_window_drive_the_open_character(amass, kind, table, tmp_path):
+    """The bundled body replaced characters that the same files drive on the command line."""
+    hero = tmp_path / ("hero.obj" if table is None else "hero.glb")
+    if table is None:
+        hero.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    else:
+        hero.write_bytes(character_of(table).glb())
+    people = amass if kind == "file" else write_frames(tmp_path / "smpl", {0: [body(0)]})
+    loader = Loader([people], [[people]], lambda: None, opened=[hero])
+    assert loader.wait(60.0)
+    assert loader.error == ""
+    (actor,) = loader.scene.actors
+    assert actor.figure.name == ("body" if table is None else "hero")
+    assert loader.paths == ((people,) if table is None else (hero, people))
 
 
 HANDLESS = """

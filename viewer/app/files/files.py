@@ -123,14 +123,18 @@ class Loader(ThreadJob):
 
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures
-        if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
-            figures = []  # people drawn with the bundled body replace the scene
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         morphs = [*opened.morphs, *contents.morphs]
         joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
         joined.used_options = (contents.used_options or set()) | (opened.used_options or set())
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
+        has_bodies = any(is_body(figure) for _, figure in figures)
+        drives = any(actor.drive is not None for actor in self.scene.actors)
+        if contents.only_bodies and not (has_bodies or drives):
+            # People drawn with the bundled body replace the scene.
+            kept = {path for path, _ in opened.morphs}
+            self.scene, self.builders = begin(replace(joined, figures=[]), self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:
             # A BVH that drives no open figure is shown separately.
             kept = set()
