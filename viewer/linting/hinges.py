@@ -37,6 +37,8 @@ def check(subject: Subject) -> Iterator[Finding]:
             # A leg that hardly bends otherwise bends away from the toes.
             toe = limb[2].replace("_ankle", "_foot")
             toes = [names.index(toe)] if toe != limb[2] and toe in names else []
+            if not set(toes).isdisjoint(ends):
+                continue  # without an ankle, the ball of the foot is ahead of the shin's end
             upper, hinge = (names.index(name) for name in limb[:2])
             yield from _hinge(subject, track, skeleton, (upper, hinge), ends, toes)
 
