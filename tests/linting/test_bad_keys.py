@@ -270,14 +270,14 @@ def test_elbow_of_an_arm_without_a_wrist_is_checked():
 
 def test_ball_of_a_foot_is_no_end_of_a_shin():
     """Without an ankle, it makes a straight leg seem to be 15 degrees beyond: 0.08 at 0.3."""
-    names = ("pelvis", "left_hip", "left_knee", "left_foot")
+    names = ("Hips", "LeftUpLeg", "LeftLeg", "LeftToeBase")
     offsets = [[0, 1, 0], [0.1, 0, 0], [0.3, 0, 0], [0.3, -0.08, 0]]
     bends = waving()
     bends[30:39] = 0.0
     turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 4, 1))
     turns[:, 2] = about_z(bends)
     clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 4, 3)))
-    for end, n_found in ((names[3], 0), ("left_ankle", 1)):
+    for end, n_found in ((names[3], 0), ("LeftFoot", 1)):
         skeleton = make_skeleton((*names[:3], end), [-1, 0, 1, 2], offsets)
         figure = Figure("leg", skeleton=skeleton, unit="m")
         assert len([*hinges.check(Subject(Actor(figure, clip=clip)))]) == n_found
