@@ -371,6 +371,16 @@ def test_skeleton_upside_down_at_rest_and_in_the_frames_hangs(tmp_path):
         assert_allclose(actor.placement[1], [0, sign, 0, 0], atol=1e-12)
 
 
+def test_skeleton_upside_down_in_the_frames_alone_is_mentioned():
+    # The root is rotated by 180 degrees about x: a handstand, or the space of a camera.
+    text = (
+        GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + "0 0 1 0 180 0 0 0 0 0 0 0 0 0 0\n" * 2
+    )
+    motion, warnings = read(text)
+    assert motion.figure.up == "y" and not motion.hangs
+    assert warnings == ["y up assumed, although the skeleton is upright along -y in the frames"]
+
+
 def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis():
     # The rest pose is along x, and rotated by 90 degrees about z in every frame.
     text = GOOD.replace("0.0 -0.9 0.0", "-0.9 0 0").replace("0.0 0.6 0.0", "0.6 0 0")

@@ -234,6 +234,7 @@ def _boxes(table: Table, parents: Ints) -> Floats:
 # Estimates of what the file does not state: unit, up axis and exact frame rate.
 
 Facts = tuple[tuple[str, str], ...]
+_DESPITE_FRAMES = "{up} up assumed, although the skeleton is upright along {axis} in the frames"
 _INCHES = (30.0, 90.0)  # heights of humans in inches, 0.76 to 2.3 m
 _RATES = (
     *(12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 144.0, 150.0),
@@ -365,11 +366,7 @@ def guess_up(
         other: Up = "z" if up == "y" else "y"
         size = float(np.linalg.norm(heights, axis=1).mean())
         if rest in ("+y", "+z") and _lies(posed, other, up, size):
-            note = Phrase(
-                "{up} up assumed, although the skeleton is upright along {axis} in the frames",
-                up=up,
-                axis=stands,
-            )
+            note = Phrase(_DESPITE_FRAMES, up=up, axis=stands)
             return up, (("up", f"{up}, from the rest skeleton"),), (note,), False
         note = Phrase(wording.UP_OF_FRAMES, up=other, axis=rest or Phrase("no axis"))
         return other, (("up", f"{other}, from the frames"),), (note,), False
@@ -385,7 +382,9 @@ def guess_up(
         note = Phrase("{up} up assumed: the head is above the feet along {up}", up="z")
         return "z", (("up", "z, from the rest skeleton"),), (note,), False
     if rest == "+y":
-        return "y", (("up", "y, from the rest skeleton"),), (), False
+        # A handstand, or the space of a camera: only the user knows.
+        over = (Phrase(_DESPITE_FRAMES, up="y", axis=stands),) if stands == "-y" else ()
+        return "y", (("up", "y, from the rest skeleton"),), over, False
     if stands == "+y":
         note = Phrase(wording.UP_OF_FRAMES, up="y", axis=rest or Phrase("no axis"))
         return "y", (("up", "y, from the frames"),), (note,), False
