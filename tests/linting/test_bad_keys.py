@@ -7,10 +7,12 @@ import pytest
 from linting.sound import FRAMES, RATE, legs, make_skeleton
 
 from viewer.linting import Finding, Subject, frozen, hinges, jitter, pops, stretch
+from viewer.linting._subject import ends_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.scene import Actor
 
 K = np.arange(FRAMES)
@@ -266,6 +268,15 @@ def test_elbow_of_an_arm_without_a_wrist_is_checked():
     (found,) = hinges.check(Subject(Actor(figure, clip=clip)))
     assert found.joints.tolist() == [3] and found.diagnostic.values["angle"] == pytest.approx(40.0)
     assert sorted(found.frames.tolist()) == [*range(30, 39)]
+
+
+def test_arm_without_a_wrist_ends_in_the_joints_of_the_hand():
+    names = ("Hips", "LeftArm", "LeftForeArm", "LeftForeArmTwist", "LeftHandIndex1", "Prop")
+    limb = ("left_shoulder", "left_elbow", "left_wrist")
+    for n_joints, expected in ((6, [4]), (4, [3]), (3, [])):
+        parents = [-1, 0, 1, 2, 2, 2][:n_joints]
+        skeleton = make_skeleton(names[:n_joints], parents, [[0.0, 1.0, 0.0]] * n_joints)
+        assert ends_of(limb, joint_meanings(skeleton), skeleton) == expected
 
 
 def test_ball_of_a_foot_is_no_end_of_a_shin():

@@ -283,7 +283,9 @@ def ends_of(limb: Sequence[str], names: Sequence[str], skeleton: Skeleton) -> li
         return [names.index(limb[2])]
     if limb[1] not in names:
         return []
-    return np.flatnonzero(skeleton.parents == names.index(limb[1])).tolist()
+    below = np.flatnonzero(skeleton.parents == names.index(limb[1])).tolist()
+    # Joints that twist a forearm are not of the hand.
+    return [joint for joint in below if names[joint]] or below
 
 
 def world_turns(rotations: Floats, skeleton: Skeleton, joint: int) -> Floats:
