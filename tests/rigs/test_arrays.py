@@ -80,9 +80,17 @@ def test_frozen_refuses_to_truncate_to_integers(values):
     assert str(caught.value) == "parents: expected whole numbers that fit int32"
 
 
-@pytest.mark.parametrize("values", [["a"], [[1.0], [1.0, 2.0]], [object()]])
-def test_frozen_refuses_non_numeric_arrays(values):
-    with pytest.raises(RigError, match=r"^x: expected numbers, found "):
+@pytest.mark.parametrize(
+    ("values", "found"),
+    [
+        ("a", "'a'"),
+        (["a", "b"], r"\['a', 'b'\]"),
+        ([[1.0], [1.0, 2.0]], "rows of different lengths"),
+        ([object()], "<object object at .*>"),
+    ],
+)
+def test_frozen_refuses_non_numeric_arrays(values, found):
+    with pytest.raises(RigError, match=rf"^x: expected numbers, found {found}$"):
         frozen("x", values, (None,))
 
 

@@ -184,12 +184,16 @@ def _converted(name: str, values: object, dtype: np.dtype[np.generic]) -> NDArra
     """Convert values to an array of a type; an integer type rejects fractions."""
     try:
         given = np.asarray(values)
-        if given.dtype == dtype:
-            return given
+    except ValueError:
+        raise RigError(f"{name}: expected numbers, found rows of different lengths") from None
+    if given.dtype == dtype:
+        return given
+    try:
         with np.errstate(invalid="ignore"):
             array = given.astype(dtype)
-    except (TypeError, ValueError) as problem:
-        raise RigError(f"{name}: expected numbers, found {printable(problem)}") from None
+    except (TypeError, ValueError):
+        found = printable(given.tolist() if given.size > 1 else repr(given.item()), 60)
+        raise RigError(f"{name}: expected numbers, found {found}") from None
     if dtype.kind != "f" and not np.array_equal(array, given):
         raise RigError(f"{name}: expected whole numbers that fit {dtype}")
     return array
