@@ -354,7 +354,7 @@ def _posture(
     # People have 0.3, characters 0.1 to 0.7. Lowered sleeves that touch the trunk everywhere are no
     # limbs; if arms are then made of what swings beside the hips, it is 1 or more.
     neck = Finding(
-        "R017.neck: the head is {value:.1f} times the length of the trunk above the shoulders",
+        "R017.neck: the head is above the shoulders by {value:.1f} times the length of the trunk",
         own,
         wrong=1.25,
         good=0.75,

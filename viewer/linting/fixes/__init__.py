@@ -1,7 +1,7 @@
 """Repair of what lint finds: one module a subject, each fix with what it changed and by how much.
 
-Fixes change neither the number of vertices, triangles and joints nor their order, so that findings
-stay valid while the others are fixed.
+Fixes change neither the number of vertices, triangles and joints nor their order, so that the
+indices in findings stay valid while others are fixed.
 """
 
 from __future__ import annotations
