@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.app.closing import unsaved_edits
 from viewer.app.core.view_frame import view_frame
+from viewer.app.files.files import Files
 from viewer.app.posing.posing import save_export
 from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.rigging import Rigging
@@ -33,6 +34,29 @@ VOXEL = 8.0 / 96  # of the bar
 ATOL = 0.6 * VOXEL
 
 BY_HEAT = TransferSettings("heat", AlignmentSettings(matrix=np.eye(4)))
+
+
+NOD = """HIERARCHY
+ROOT base
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT tip
+  {
+    OFFSET 0 1 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 1 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+0 0 0 0 0 0 0 0 0
+0 0 0 0 0 0 30 0 0
+"""
 
 
 def bar():
@@ -394,6 +418,27 @@ def test_own_joints_of_a_bound_figure_keep_their_weights(drive):
     hand.step(2)
     assert not editing.is_on and hand.says("Edit skeleton is off")
     assert hand.state.scene.actors[1].figure is other
+
+
+def test_motion_that_is_opened_drives_the_rig_that_the_question_has_saved(drive, tmp_path):
+    hand = opened(drive, arm(), start="own")
+    hand.state.of(JointEditing).choices.weights = "keep"
+    frame, center = view_frame(hand.state), rest_worlds(arm())[1, :3, 3]
+    hand.pull(frame.place(center), frame.place(center + np.array([0.0, 0.4, 0.0])))
+    hand.step(2)
+    edited, motion = figure(hand), tmp_path / "nod.bvh"
+    motion.write_text(NOD)
+    hand.open(motion)
+    hand.click("Save…")
+    save = hand.state.of(Files).dialog.done
+    hand.state.of(Files).dialog = None
+    save(hand.state, [tmp_path / "arm.glb"])
+    hand.finish_job()
+    hand.wait_for_loader()
+    hand.step(2)
+    (actor,) = hand.state.scene.actors
+    assert hand.state.paths == (tmp_path / "arm.glb", motion) and actor.drive is not None
+    assert_allclose(rest_worlds(actor.figure), rest_worlds(edited), atol=1e-6)
 
 
 def test_figure_without_a_mesh_has_nothing_to_edit(drive):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import field, replace
 from functools import partial
+from pathlib import Path
 from weakref import WeakSet
 
 from viewer.data_classes import dataclass
@@ -31,6 +32,8 @@ class SavedWork:
     _objects: list[object] = field(default_factory=list)
     edited: WeakSet[Figure | Motion] = field(default_factory=WeakSet)
     """Figures whose rig or mesh was edited, and fixed motions, saved or not."""
+    rig: tuple[Path, ...] = ()
+    """Files of the rig that was made for the scene's mesh and saved last: motions drive these."""
 
     def add(self, *objects: object) -> None:
         """Record objects whose content is saved."""

@@ -44,6 +44,7 @@ from viewer.rigs.scene import Actor, Scene
 _Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
+_RIGS = (".glb", ".gltf", ".vrm", ".npz", ".skel", ".skin")  # of the files of a rigged mesh
 _WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
@@ -89,10 +90,15 @@ class Loader(ThreadJob):
         self.builders: list[Builder] = []
         self.addition: Contents | None = None
         """Poses and images for the open figure, if the files contain nothing else."""
+        self._given = (tuple(paths), attempts, wake, settings)
         self._attempts, self._settings = attempts, settings
         self._opened = tuple(opened)
         title = f"Opening {printable(self.paths[-1].name, 60)}"
         super().__init__(title, self._try_all, wake=wake, names_steps=False, is_daemon=True)
+
+    def for_figure(self, opened: Sequence[Path]) -> Loader:
+        """Return a loader of the same files, whose motions drive the figure of other files."""
+        return Loader(*self._given, opened)
 
     def _try_all(self) -> None:
         for paths in self._attempts:
@@ -323,10 +329,24 @@ def open_files(state: AppState, paths: Sequence[Path]) -> None:
     is_part &= len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2
     if is_part and paths[0].suffix.lower() not in _ADDED:
         attempts.insert(0, [*state.paths, *paths])
-    opened = state.paths or bundled_files()
+    opened = state.of(SavedWork).rig or state.paths or bundled_files()
     rig, files.rig = files.rig, ""
     settings = MotionSettings(up=files.up, rig=rig, springs=True)
     files.loader = Loader(paths, attempts, files.wake, settings, opened)
+
+
+def drive_saved_rig(state: AppState, written: Sequence[Path]) -> None:
+    """Let motions that are opened drive a rig that was saved, if it is all that is shown.
+
+    A motion whose opening has led to the question whether to save the rig is read again.
+    """
+    files, shown = state.of(Files), [actor for actor in state.scene.actors if actor.visible]
+    rig = [path for path in written if path.suffix.lower() in _RIGS]
+    if len(shown) > 1 or not rig:
+        return
+    state.of(SavedWork).rig = tuple(rig)
+    if files.loader is not None:
+        files.loader = files.loader.for_figure(rig)
 
 
 def take_loaded(

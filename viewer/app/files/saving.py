@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState, shows_errors
+from viewer.app.files.files import drive_saved_rig
 from viewer.errors import ViewerError, reason_of
 from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
@@ -36,8 +36,12 @@ def save_in_background(
     files: Sequence[Path],
     inputs: Sequence[Path] = (),
     saved: Iterable[object] = (),
+    is_rig: bool = False,
 ) -> None:
-    """Write files in a job, all or none; no input, nor a file of the scene, may be replaced."""
+    """Write files in a job, all or none; no input, nor a file of the scene, may be replaced.
+
+    ``is_rig``: whether they contain a rig that was made in the window.
+    """
     if why := no_job_room(state):
         state.error = why
         return
@@ -51,7 +55,12 @@ def save_in_background(
         return [*map(str, notes), _saved(files)]
 
     title, known = f"Writing {printable(files[0].name, 60)}", state.of(SavedWork)
-    finish = partial(known.add, *saved)
+
+    def finish() -> None:
+        known.add(*saved)
+        if is_rig and state.of(SavedWork) is known:
+            drive_saved_rig(state, files)
+
     state.job = ThreadJob(title, write, finish, "export", names_steps=False)
 
 

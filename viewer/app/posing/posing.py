@@ -273,9 +273,11 @@ def save_export(
         return export(selection, path, options=how) + notes
 
     saved = [each for actor in actors for each in _saved(actor)]
-    if path.suffix.lower() in _RIGS:
+    has_rig = path.suffix.lower() in _RIGS
+    if has_rig:
         saved += [actor.figure for actor in actors]
-    save_in_background(state, act, files, saved=saved)
+    is_rig = has_rig and state.actor.figure in state.of(SavedWork).edited
+    save_in_background(state, act, files, saved=saved, is_rig=is_rig)
 
 
 def _saved(actor: Actor) -> list[object]:

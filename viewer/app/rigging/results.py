@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -283,7 +284,8 @@ def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result in the background: all of its files or none."""
     files = files_of(path)
     inputs = result.template.paths
-    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, [result])
+    act = partial(write_rigged, result.rigged, path)
+    save_in_background(state, act, files, inputs, [result], is_rig=True)
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
