@@ -167,6 +167,7 @@ def test_dialog_shows_unusual_names(dialog, tmp_path):
     ("typed", "written"),
     [
         ("ada.gif.mp4", "ada.gif"),
+        ("sub/ada.gif.mp4", "sub/ada.gif"),
         ("ada.GIF.mp4", "ada.GIF"),
         ("ada.mp4.mp4", "ada.mp4"),
         ("ada.v2.mp4", "ada.v2.mp4"),  # not the suffix of a video

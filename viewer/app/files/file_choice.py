@@ -118,12 +118,13 @@ class FileDialog:
     def typed_name(self) -> str:
         """Return the name without the suggested suffix after a typed one: ``ada.gif.mp4``."""
         name = single_suffix(self.name.strip())
-        stem = PurePath(name).stem
+        suffix = PurePath(name).suffix
+        stem = name.removesuffix(suffix)  # with the folder
         # Names that were not typed are kept: the suggested one, and those of existing files.
         if name == self.suggested or self.folder / name in self.entries:
             return name
         is_typed = PurePath(stem).suffix.lower() in self.suffixes
-        return stem if is_typed and PurePath(name).suffix == self.suffix else name
+        return stem if is_typed and suffix == self.suffix else name
 
     def move(self, step: int) -> None:
         """Move the highlight in the list, and choose the file that it reaches."""
