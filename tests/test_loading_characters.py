@@ -352,7 +352,8 @@ def test_figure_that_has_no_hands_and_feet_either_is_driven_without_doubts(tmp_p
     assert not keys & {"F007.joints-without-partner", "C018.limbs-unknown"}
 
 
-def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tmp_path):
+@pytest.mark.parametrize("is_named", [True, False])
+def test_course_clip_of_a_bare_skeleton_drives_a_figure(tmp_path, is_named):
     """The clip used to move only its own skeleton, with a note that --model has no effect."""
     hero, skel, anim = tmp_path / "hero.glb", tmp_path / "a.skel", tmp_path / "a.anim"
     hero.write_bytes(character_of(RIGGED).glb())
@@ -375,8 +376,9 @@ def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tm
         for end in ends
     )
     anim.write_text(f"animation {{ range 0 1 numchannels {len(ends)}\n{channels} }}")
-    settings = MotionSettings(model=hero, feet=False)
-    (actor,) = load(skel, anim, motion=settings).actors
+    settings = MotionSettings(model=hero if is_named else None, feet=False)
+    files = [skel, anim] if is_named else [skel, anim, hero]  # as of --body
+    (actor,) = load(*files, motion=settings).actors
     assert actor.figure.name == "hero"
     places = []
     for time in (0.0, 1.0):
@@ -388,8 +390,8 @@ def test_course_clip_of_a_bare_skeleton_drives_the_figure_of_the_model_option(tm
     assert_allclose(start["left_knee"] - start["left_hip"], [0, -1, 0], rtol=0, atol=1e-9)
     # Rx(-90) (0, -1, 0) = (0, 0, 1)
     assert_allclose(end["left_knee"] - end["left_hip"], [0, 0, 1], rtol=0, atol=1e-9)
-    beside = load(skel, anim, motion=replace(settings, drives=False))
-    assert [each.figure.name for each in beside.actors] == ["a"]
+    beside = load(*files, motion=replace(settings, drives=False))
+    assert [each.figure.name for each in beside.actors] == (["a"] if is_named else ["a", "hero"])
 
 
 @pytest.mark.parametrize("is_named", [False, True])

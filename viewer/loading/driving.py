@@ -64,9 +64,6 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     drives = bool(contents.skeleton_motions or bare) and settings.drives
     models = BodyModels(draft, settings)
     named = models.named("") if drives else None
-    if named is not None:
-        for actor in bare:
-            _drive_by_clip(actor, draft, settings, named)
     if settings.model is not None and named is None and contents.skeleton_motions:
         draft.note(
             "F007.model-beside: --model {model}: no motion is applied to it with --beside",
@@ -78,6 +75,8 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
         alone = give_skeleton_motion(path, motion, draft, settings, named)
         lone += [] if alone is None else [alone]
         draft.note_motions(path)
+    for actor in bare if settings.drives else ():
+        _drive_by_clip(actor, draft, settings, named)
     paths = [path for path, _ in contents.captures]
     for option, footage in (("--video", settings.video), ("--images", settings.images)):
         if footage is not None and len(paths) > 1:
@@ -133,16 +132,26 @@ def _is_bare_clip(actor: Actor) -> bool:
 
 
 def _drive_by_clip(
-    actor: Actor, draft: SceneDraft, settings: MotionSettings, model: Figure
+    actor: Actor, draft: SceneDraft, settings: MotionSettings, model: Figure | None
 ) -> None:
-    """Let a skeleton's clip move the requested model, as a BVH file does."""
+    """Let a skeleton's clip move the requested model, or else another figure, as a BVH file does.
+
+    A skeleton that moves no figure stays.
+    """
+    others = [other for other in draft.actors if other.figure.is_attached and other.clip is None]
+    if model is None and not others:
+        return
     figure, clip = actor.figure, actor.clip
     assert isinstance(clip, Clip)  # as of _is_bare_clip
     moving = Figure(figure.name, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
     motion = SkeletonMotion(moving, baked(figure, clip, settings.frame_rate or DEFAULT_RATE))
-    draft.take(next(index for index, other in enumerate(draft.actors) if other is actor))
+    place = next(index for index, other in enumerate(draft.actors) if other is actor)
     path = Path(figure.name) if actor.clip_origin is None else actor.clip_origin[0]
-    give_skeleton_motion(path, motion, draft, settings, model)
+    if model is not None:
+        draft.take(place)
+        give_skeleton_motion(path, motion, draft, settings, model)
+    elif drive_somebody(path, settings.drive_of(motion), draft, np.eye(4), others)[0]:
+        draft.take(place)
 
 
 def _give_body_motion(
