@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from viewer.rigs.retargeting.joint_map import JointMap
 
 _DEFAULT = "the bundled figure"
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
-"""Suffixes of writable image formats."""
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}  # suffixes of sizes, bytes
 
 

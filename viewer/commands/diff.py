@@ -24,7 +24,7 @@ from viewer.commands._keywords import arguments_of, paths_of, without_dashes
 from viewer.commands._pose import add_skinning_arguments
 from viewer.commands._printing import table_lines
 from viewer.commands._progress import shown_progress
-from viewer.commands._scene import PICTURES, print_warnings
+from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, described, note
@@ -32,6 +32,7 @@ from viewer.diagnostics.record import finite, is_recorded, note_values
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
+from viewer.media.image import PICTURES
 from viewer.phrases import brief, printable, rounded
 from viewer.rendering.options import DisplayOptions
 from viewer.rigs.annotations import VertexField

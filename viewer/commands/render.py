@@ -20,7 +20,6 @@ from viewer.commands._frames import Frames, add_frame_arguments, parse_range
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, use_file_method
 from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
-    PICTURES,
     SceneOptions,
     add_capture_arguments,
     add_file_arguments,
@@ -49,6 +48,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import deferred, hold
+from viewer.media.image import PICTURES
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera

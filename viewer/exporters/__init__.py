@@ -17,6 +17,8 @@ from viewer.exporters._motion_paths import files_at, is_together, part_files, pa
 from viewer.exporters._options import ExportOptions, PageOptions, VrmMeta
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
+from viewer.media.image import PICTURES
+from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import all_of, counted, listed, printable
 from viewer.plugins import plugin_of, plugins_of
 from viewer.rigs.bodies.smpl_family import member_of
@@ -258,14 +260,11 @@ def exporters_of(path: str | Path, content: Content) -> list[str]:
     raise UnsupportedFormatError(f'{what} for "{suffix or FOLDER}"; supported: {known}')
 
 
-_DRAWN = (".png", ".jpg", ".jpeg", ".gif", ".mp4", ".webm")
-
-
 def no_exporter(path: str | Path) -> UnsupportedFormatError:
     """Return the error of a suffix that nothing writes."""
     known = ", ".join([known_suffixes(), *(f".{each.name}" for each in plugins_of("exporters"))])
     suffix = Path(path).suffix.lower() or FOLDER
-    if suffix in _DRAWN:
+    if suffix in (*PICTURES, *VIDEOS):
         known += "; viewer render draws pictures and videos, as do viewer.render and viewer.video"
     return UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
 

@@ -21,6 +21,8 @@ from viewer.rigs.arrays import Bytes
 if TYPE_CHECKING:
     from PIL import Image
 
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
+"""Suffixes of writable image formats."""
 
 _MAX_PIXELS = 16384 * 16384  # limit for one image, and for all images that are decoded together
 # Small files may hold huge images of one colour: images that are decoded together may have this

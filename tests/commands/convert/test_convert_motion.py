@@ -141,6 +141,7 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
         (["-o", "w.bvh", "--frames", "2:1"], "--frames: expected A:B"),
         (["-o", "w.bvh", "--frames", "0:4:2"], "--frames: expected A:B"),
         (["-o", "w.xyz"], 'no exporter for ".xyz"; supported:'),
+        (["-o", "w.webp"], "; viewer render draws pictures and videos"),
         (["-o", "w.bvh", "--as", "anim"], "--as anim: expected a name with .anim"),
         (["-o", "missing/w.bvh"], "missing/w.bvh: the folder "),
         (["-o", "w.bvh", "--digits", "99"], "--digits: expected 1 to 15, found 99"),
