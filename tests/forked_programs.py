@@ -54,7 +54,7 @@ class Forked:
 
     def __init__(self, connection: socket.socket, failed, streams: list[int]) -> None:
         self._connection, self._failed, self._streams = connection, failed, streams
-        self._output: list[bytes] = []
+        self._output = dict.fromkeys(streams, b"")
         self.returncode: int | None = None
         self.pid = self._number()
 
@@ -74,20 +74,22 @@ class Forked:
         self.send_signal(signal.SIGKILL)
 
     def communicate(self, timeout: float = PATIENCE) -> tuple[bytes, ...]:
-        """Return what the program has written until its end; too short to fill a pipe."""
+        """Return what the program has written until its end."""
         end = time.monotonic() + timeout
         while self._streams:
-            parts = []
-            while not parts or parts[-1]:
-                left = max(end - time.monotonic(), 0.0)
-                if not select.select([self._streams[0]], [], [], left)[0]:
-                    raise TimeoutError(f"the program runs for longer than {timeout:g} s")
-                parts.append(os.read(self._streams[0], 1 << 16))
-            os.close(self._streams.pop(0))
-            self._output.append(b"".join(parts))
+            left = max(end - time.monotonic(), 0.0)
+            ready = select.select(self._streams, [], [], left)[0]
+            if not ready:
+                raise TimeoutError(f"the program runs for longer than {timeout:g} s")
+            for stream in ready:
+                data = os.read(stream, 1 << 16)
+                self._output[stream] += data
+                if not data:
+                    os.close(stream)
+                    self._streams.remove(stream)
         if self.returncode is None:
             self.returncode = self._number()
-        return tuple(self._output)
+        return tuple(self._output.values())
 
 
 class Forker:
@@ -96,6 +98,7 @@ class Forker:
     def __init__(self, modules=IMPORTED, **environment: str) -> None:
         self._connection, other = socket.socketpair()
         self._connection.settimeout(PATIENCE)
+        self._started: Forked | None = None
         with other:
             self._process = subprocess.Popen(
                 listening(__file__, other.fileno(), *modules),
@@ -107,13 +110,21 @@ class Forker:
 
     def start(self, program, arguments, folder, environment=None) -> Forked:
         """Start a program like ``python -c``, its output captured."""
+        self._end()
         place = [dict(environment or os.environ), str(folder)]
         request = json.dumps([place, program, *map(str, arguments)]).encode()
         pipes = [os.pipe() for _ in range(2)]
         socket.send_fds(self._connection, [request], [writing for _, writing in pipes])
         for _, writing in pipes:
             os.close(writing)
-        return Forked(self._connection, self._failed, [reading for reading, _ in pipes])
+        self._started = Forked(self._connection, self._failed, [reading for reading, _ in pipes])
+        return self._started
+
+    def _end(self) -> None:
+        """End a program that a failed test has left: its exit code would be taken for a pid."""
+        if self._started is not None and self._started.returncode is None:
+            self._started.kill()
+            self._started.communicate()
 
     def run(self, program, arguments, folder, environment=None) -> subprocess.CompletedProcess:
         """Run a program to its end."""
@@ -125,6 +136,7 @@ class Forker:
         raise RuntimeError(self._process.communicate(timeout=PATIENCE)[1].decode())
 
     def close(self) -> None:
+        self._end()
         self._connection.close()
         assert self._process.communicate(timeout=PATIENCE) == (b"", b"")
 
