@@ -231,6 +231,13 @@ pelvis 0 2 0
 """
 
 
+SNAKE = """
+head 0 0 1
+ trunk 0 0 -1
+  tail 0 0 -1
+"""
+
+
 @pytest.mark.parametrize("is_named", [False, True])
 def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
     amass, is_named, tmp_path
@@ -260,7 +267,9 @@ def test_character_with_joint_names_of_a_body_model_walks_in_its_own_size(
 
 
 @pytest.mark.parametrize("kind", ["file", "capture"])
-@pytest.mark.parametrize("table", [RIGGED, None], ids=["body names", "no joints"])
+@pytest.mark.parametrize(
+    "table", [RIGGED, SNAKE, None], ids=["body names", "other names", "no joints"]
+)
 def test_people_opened_in_the_window_drive_the_open_character(amass, kind, table, tmp_path):
     """The bundled body replaced characters that the same files drive on the command line."""
     hero = tmp_path / ("hero.obj" if table is None else "hero.glb")
@@ -273,8 +282,8 @@ def test_people_opened_in_the_window_drive_the_open_character(amass, kind, table
     assert loader.wait(60.0)
     assert loader.error == ""
     (actor,) = loader.scene.actors
-    assert actor.figure.name == ("body" if table is None else "hero")
-    assert loader.paths == ((people,) if table is None else (hero, people))
+    assert actor.figure.name == ("hero" if table is RIGGED else "body")
+    assert loader.paths == ((hero, people) if table is RIGGED else (people,))
 
 
 HANDLESS = """

@@ -136,7 +136,7 @@ class Loader(ThreadJob):
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         has_bodies = any(is_body(figure) for _, figure in figures)
-        drives = any(actor.drive is not None for actor in self.scene.actors)
+        drives = any(actor.drive and actor.clip for actor in self.scene.actors)
         if contents.only_bodies and not (has_bodies or drives):
             # People drawn with the bundled body replace the scene.
             kept = {path for path, _ in opened.morphs}
