@@ -409,6 +409,24 @@ def test_arm_on_a_flat_base_has_its_root_there():
     assert_allclose(joints["root"], [0.0, 0.05, 0.0], atol=0.15)
 
 
+def test_stem_leaves_the_pot_once_although_its_middle_is_between_voxels(monkeypatch):
+    # With so many voxels, paths through the stem use different columns of them from the pot on.
+    resolution(monkeypatch, 131)
+    pot = lathe([(1e-3, 0), (0.3, 0), (0.4, 0.5), (1e-3, 0.5)])
+    stem = pipe([(0, 0.4, 0), (0, 1.0, 0), (0.1, 1.6, 0.05)], 0.06)
+    leaves = [(0.8, 0.3, 0.6), (1.0, 2.2, 0.7), (1.2, 4.1, 0.6), (1.35, 5.3, 0.5)]
+    twigs = [
+        pipe([(0, y, 0), (long * np.cos(way), y + 0.35 * long, long * np.sin(way))], 0.04)
+        for y, way, long in leaves
+    ]
+    skeleton = found(united(pot, stem, *twigs)).figure.skeleton
+    joints = joints_of(skeleton)
+    assert np.linalg.norm(joints["root"] - [0, 0.25, 0]) < 0.1
+    (first,) = [name for name in joints if name != "root" and parent_of(skeleton, name) == "root"]
+    assert abs(joints[first][1] - 0.5) < 0.3
+    assert len([name for name in joints if name.endswith("_end")]) == 5
+
+
 def test_limb_from_a_hub_begins_at_it_even_if_it_tapers():
     # A spiral: a bone from the root to where the tail is thin would cross the turns.
     angles = np.linspace(0.0, 3.5 * np.pi, 60)

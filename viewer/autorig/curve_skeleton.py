@@ -69,8 +69,8 @@ _SAME = 2.0  # distance in voxels up to which cuts are one: some need two search
 # Least radius, relative to the largest one, of the place where the search for the trunk begins: the
 # deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
 _DEEP = 0.75
-# Distance from a hub at which a limb begins, relative to the radius there, from which the trunk is
-# a plate: it is 1 in a ball.
+# Distance from a hub at which a limb begins, or half width of a level set, relative to the radius
+# there, from which the trunk is a plate: it is 1 in a ball.
 _PLATE = 4.0
 _ROUNDS = 4  # searches from the trunk: each finds the middle of a plate better
 _THIN = 1.0  # radius in voxels of a sheet: its voxels are those of the surface
@@ -226,8 +226,11 @@ class _Field:
             self._cut_widths.append(float(self._widths[np.concatenate(loop)].max()))
         self._middles = self._levels.middles(self.centers)
         self.tips = self._levels.tips(lambda found: self._is_limb(found) or self._is_wanted(found))
-        routes = paths.to(np.array([source]), self.tips.rows)
-        self.routes = {k: route[::-1] for k, route in enumerate(routes) if self._stands(k, route)}
+        routes = [route[::-1] for route in paths.to(np.array([source]), self.tips.rows)]
+        stands = [k for k, route in enumerate(routes) if self._stands(k, route[::-1])]
+        thick = self._widths[self._levels.labels] <= _PLATE * self.radii
+        joined = paths.joined([routes[k] for k in stands], thick)
+        self.routes = dict(zip(stands, joined, strict=True))
         """Paths to the tips of limbs, by the index of the tip."""
 
     def _is_limb(self, found: Protrusion) -> bool:

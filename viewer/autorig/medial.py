@@ -29,7 +29,7 @@ class Paths:
 
     def __init__(self, solid: Solid) -> None:
         self.steps: csr_array = solid.graph()
-        self.radii = solid.radii()
+        self.radii, self._spacing = solid.radii(), solid.spacing
         # Close to the surface, the radius is known to half a voxel only.
         wide = np.maximum(self.radii / solid.spacing, 0.5)
         self._graph: csr_array = solid.graph(wide**-_MEDIAL)
@@ -62,6 +62,38 @@ class Paths:
             rows = [start]
             while before[rows[-1]] >= 0:
                 rows.append(int(before[rows[-1]]))
+            found.append(np.array(rows, dtype=np.int32))
+        return found
+
+    def joined(self, routes: list[Ints], thick: Bools) -> list[Ints]:
+        """Return routes from the same voxel, those that run beside each other as one.
+
+        If the middle of a limb is between voxels, routes through it may use different ones of them,
+        so that they seem to part long before their limbs do. Beside means in neighbouring voxels;
+        where limbs part, their routes are still beside each other for about the radius there.
+        ``thick`` (N,): voxels that are in no plate, through which routes are beside each other by
+        chance.
+        """
+        ways: dict[int, list[int]] = {}  # to each voxel, which is the last
+        found = []
+        for route in routes:
+            rows = route.tolist()
+            shared = max((k for k, row in enumerate(rows) if row in ways), default=len(rows))
+            last = None
+            for index in range(len(rows) - 1, shared, -1):
+                row = rows[index]
+                start, end = self.steps.indptr[row : row + 2]
+                near = [each for each in self.steps.indices[start:end].tolist() if each in ways]
+                if not near:
+                    continue
+                last = index if last is None else last
+                if not thick[rows[last]]:
+                    break
+                if (last - index) * self._spacing >= self.radii[rows[last]]:
+                    rows = [*min((ways[each] for each in near), key=len), *rows[index:]]
+                    break
+            for index, row in enumerate(rows):
+                ways.setdefault(row, rows[: index + 1])
             found.append(np.array(rows, dtype=np.int32))
         return found
 
