@@ -1,5 +1,6 @@
 """Images without a window: sizes, samples, several contexts, threads, and memory."""
 
+import signal
 import subprocess
 import sys
 import threading
@@ -12,6 +13,8 @@ from rendering.drawn_figures import arm, bent, checker, scene_of, square
 
 import viewer
 from viewer.errors import RenderError, ViewerError
+from viewer.interrupts import Interrupted, deferred, watched
+from viewer.progress import receiving
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu import target as target_module
 from viewer.rendering.gpu.context import headless_context
@@ -44,6 +47,24 @@ def test_azimuth_of_a_light_has_no_ends(scene):
     assert all(np.abs(each - pictures[0]).max() <= 1 for each in pictures[1:])
     options.lights.key.azimuth = 20.0
     assert (viewer.render(scene, size=(64, 48), options=options) != pictures[0]).any()
+
+
+def test_timed_passes_draw_the_same_picture_and_end_at_a_signal(scene):
+    size, options = (64, 48), DisplayOptions(quality="final")
+    view = default_camera(scene, size), options, scene_box(scene)
+    times, seen = [], []
+
+    with Offscreen() as offscreen:
+        plain = offscreen.render(scene, size, *view)
+        with receiving(lambda done, total, *_: seen.append((done, total))):
+            timed = offscreen.render(scene, size, *view, lambda *time: times.append(time))
+        np.testing.assert_array_equal(timed, plain)
+        assert seen == [(done, 8) for done in range(2, 8)] and [time[1] for time in times] == [8]
+        seen.clear()
+        counting = receiving(lambda done, *_: seen.append(done))
+        with pytest.raises(Interrupted), watched(), deferred(), counting:
+            offscreen.render(scene, size, *view, lambda *_: signal.raise_signal(signal.SIGINT))
+        assert seen == []  # before the first of the other passes
 
 
 def test_rows_are_returned_from_the_top(scene):

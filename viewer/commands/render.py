@@ -260,6 +260,7 @@ def draw_scene(
 ) -> Bytes:
     """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed."""
     # The default quality is lowered if drawing it in software would take long.
+    from viewer.commands._progress import shown_progress
     from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.sampling import limit_passes, time_note
@@ -270,7 +271,8 @@ def draw_scene(
     with deferred(), Offscreen(graphics=thread_graphics(device)) as offscreen:
         notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
         print_warnings(notes, "note")
-        pixels = offscreen.render(scene, size, camera, options, box, report_time)
+        with shown_progress("drawing"):
+            pixels = offscreen.render(scene, size, camera, options, box, report_time)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from viewer.interrupts import deferred
+from viewer.progress import report
 from viewer.rendering.camera import Camera, facing_camera, fit
 from viewer.rendering.gpu.context import Graphics, is_software, unreadable_devices
 from viewer.rendering.gpu.target import Target, check_size
@@ -74,7 +75,7 @@ class Offscreen:
         with self.context:
             target = self.target(size, options.samples)
             draw = partial(self.renderer.draw, scene, camera, options, target, box)
-            count, first = n_passes(options), 0
+            count = n_passes(options)
             if on_time is not None and count > 2:
                 draw(passes=range(1))
                 self.context.finish()
@@ -82,8 +83,12 @@ class Offscreen:
                 draw(passes=range(1, 2))
                 self.context.finish()
                 on_time(time.perf_counter() - started, count)
-                first = 2
-            draw(passes=range(first, count))
+                for done in range(2, count):
+                    report(done, count, "passes")  # Ctrl+C ends the picture here
+                    draw(passes=range(done, done + 1))
+                    self.context.finish()
+            else:
+                draw(passes=range(count))
             target.resolve()
             return target.read()
 
