@@ -222,7 +222,7 @@ def test_each_call_of_a_drag_is_short_wherever_it_leads(monkeypatch):
         calls.clear()
         reaching.follow(target)
         counts.append(len(calls))
-    # Up to ten steps towards the target and four in a search, of which some are tried again.
+    # Up to eight steps towards the target and three in a search, of which some are tried again.
     assert max(counts) <= 26
 
 
@@ -263,8 +263,8 @@ def test_root_has_no_chain():
 @pytest.mark.parametrize("shoulder", [FREE_SHOULDER, NARROW_SHOULDER])
 def test_drag_rotates_joints_by_few_degrees_a_centimetre_wherever_it_leads(shoulder, seed):
     # The walk leads through the shoulder, beyond the arm's length, and to places that the limits
-    # of the shoulder and of the hinge forbid. Three times 5 degrees are allowed where the hand
-    # follows, for an arm of 50 cm: 27 degrees a centimetre about each axis would be a jump.
+    # of the shoulder and of the hinge forbid. Three times 5 degrees a centimetre are allowed where
+    # the hand follows, for an arm of 50 cm.
     skeleton = hinged_arm(np.concatenate([shoulder, HINGE]))
     start = np.array([0.1, -0.3, 0.2, 0.0, -1.0, 0.0])
     pose = rest_pose(skeleton)
@@ -272,8 +272,8 @@ def test_drag_rotates_joints_by_few_degrees_a_centimetre_wherever_it_leads(shoul
     hand = world_matrices(skeleton, pose)[2, :3, 3]
     targets = walk(seed, np.array([0.0, 1.4, 0.0]), 0.63, hand, 120)
     dofs, _ = drag(skeleton, start, targets)
-    assert angles_between(skeleton, dofs).max() <= np.sqrt(3.0) * 15.0
-    assert (np.abs(np.diff(dofs, axis=0)).max(axis=1) <= np.radians(5.0) * 50 / 55 * 3 + 1e-9).all()
+    # The rotation is known by its linearisation, to a few percent.
+    assert angles_between(skeleton, dofs).max() <= 1.1 * 15.0 * 50 / 55
     low, high = skeleton.dof_limits.T
     assert (dofs >= low - 1e-12).all() and (dofs <= high + 1e-12).all()
 
@@ -293,6 +293,23 @@ def test_drag_follows_a_reachable_path_exactly_and_hardly_faster_than_the_path()
     assert distances.max() < 0.001 * 0.55
     known = np.concatenate([path, np.zeros((len(path), 3))], axis=1)
     assert angles_between(skeleton, dofs).max() <= 1.1 * angles_between(skeleton, known).max()
+
+
+@pytest.mark.parametrize("tilt", [-1.2, -1.0, 0.6])
+def test_stiff_arm_turns_by_the_arc_of_its_hand_beside_gimbal_lock(tilt):
+    # The shortest rotation that leads a hand along a great circle is the angle of its arc. Near
+    # gimbal lock, at 90 degrees, the smallest change of the DOFs is not the shortest rotation.
+    skeleton = hinged_arm(np.concatenate([FREE_SHOULDER, 0.0 * HINGE]))
+    pose, start = rest_pose(skeleton), np.array([0.3, tilt, 0.2, 0.0, 0.0, 0.0])
+    pose.dofs[:6] = start
+    first = world_matrices(skeleton, pose)[2, :3, 3] - [0.0, 1.4, 0.0]
+    side = np.cross(first, [0.3, 1.0, 0.2])
+    side *= 0.55 / np.linalg.norm(side)
+    arc = np.arange(0.0, 0.4, 0.02)[:, None]
+    targets = [0.0, 1.4, 0.0] + np.cos(arc) * first + np.sin(arc) * side
+    dofs, distances = drag(skeleton, start, targets)
+    assert distances.max() < 1e-4
+    assert angles_between(skeleton, dofs).max() <= 1.05 * np.degrees(0.02)
 
 
 def test_hand_is_approached_smoothly_at_full_length_and_keeps_its_side():

@@ -3,8 +3,11 @@
 Damped least squares (Wampler 1986; Nakamura and Hanafusa 1986): with the error e from the joint
 to its target and the Jacobian J of the joint's position with respect to the chain's rotation DOFs,
 
-    step = J^T (J J^T + lambda^2 I)^-1 e
+    step = G^-1 J^T (J G^-1 J^T + lambda^2 I)^-1 e
 
+G measures a change of the DOFs by the rotation of the joints that it makes. Without it, angles
+about nearly parallel axes would count as much as others, and a ball joint near gimbal lock would
+twist to keep its angles small (with G = I, 7 times the shortest rotation at 70 degrees).
 A step that does not reduce the error is rejected and the damping increased (Levenberg 1944). DOFs
 that a step would move beyond a limit stop there, and the others compensate.
 
@@ -39,6 +42,9 @@ _SADDLE = 1e-4  # curvature below which a bend brings the joint nearer, of the c
 _LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 0.05, 1e3  # of the chain's length
 _IDENTITY = np.eye(4)
 _APART = 1e-5  # step in radians of differences; their error is about its square
+# Added to the squared rotation for a change of each DOF: in gimbal lock two DOFs can cancel each
+# other without limit.
+_ASIDE = 0.02
 
 # Limits of a drag. Rotation for movement is in radians for each chain's length that the target
 # moves: 5 degrees a centimetre for an arm of half a metre. A target that the joint follows may need
@@ -46,12 +52,12 @@ _APART = 1e-5  # step in radians of differences; their error is about its square
 # limit the straighter it is.
 _RATE = np.radians(5.0) * 50.0
 _MOST_NEEDED = 3.0  # what a target that is followed may need, relative to _RATE
-_RETURN = 0.2  # rotation towards the pose at the start that leaves the joint in place, of _RATE
+_RETURN = 0.05  # rotation towards the pose at the start that leaves the joint in place, of _RATE
 _GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
 _MARGIN = 1.25  # of what a step needs, which is known by its linearisation
 # Maximum steps per call towards the target, and in a search for another pose: they bound the time
 # of a frame.
-_DRAG_ROUNDS, _SEARCH_ROUNDS = 10, 4
+_DRAG_ROUNDS, _SEARCH_ROUNDS = 8, 3
 _SLOW = 1e-3  # relative decrease of the error below which a drag has settled
 # Distance to the target from which a joint may be held by limits or a straight chain, and movement
 # of the target after which other poses are tried again, of the chain's length.
@@ -240,6 +246,12 @@ class Reaching:
         self._rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
         start = pose.copy()
         self._dofs = start.dofs
+        self._kinds = skeleton.dof_kinds[self._rows] - FIRST_ROTATION
+        self._axes = np.eye(3)[self._kinds]
+        self._cross = np.cross(self._axes[:, None], np.eye(3)).swapaxes(1, 2)
+        self._square = self._cross @ self._cross
+        self._of_joint = np.unique(skeleton.dof_joints[self._rows], return_inverse=True)[1]
+        self._is_same_joint = self._of_joint[:, None] == self._of_joint
         self._low, self._high = skeleton.dof_limits[self._rows].T
         self._dofs[self._rows] = np.clip(self._dofs[self._rows], self._low, self._high)
         position = position_of(skeleton, start, joint, self._rows)
@@ -255,6 +267,9 @@ class Reaching:
         self._soft = float(np.clip(room, 0.0, _SOFT * self._size))
         self._target = self._wanted = self._first.place
         self._damping = _FIRST_DAMPING
+        self._metric: Floats
+        self._inverse: Floats | None  # none in searches: all angles count as much
+        self._metric, self._inverse = self._measured()
         self._other: _State | None = None  # from the start, searched for a nearer pose
         self._since_held = np.inf  # movement of the target since, of the chain's length
 
@@ -263,16 +278,20 @@ class Reaching:
         target = np.asarray(target, dtype=np.float64)
         wanted = self._within(target, self._soft)
         moved = float(np.linalg.norm(target - self._target)) / self._size
+        self._metric, inverse = self._measured()
+        self._inverse = inverse
         most = _GLIDE
         if moved > 0.0:
             needed = self._step(self._goal, wanted - self._wanted, _LEAST_DAMPING)
-            needs = float(np.abs(needed).max()) / (_RATE * moved)
+            needs = self._turn(needed) / (_RATE * moved)
             most = _RATE * moved * min(max(1.0, _MARGIN * needs), _MOST_NEEDED)
         self._target, self._wanted = target, wanted
-        goal = self._returned(self._goal, _RETURN * _RATE * moved)
+        goal = self._returned(self._goal, _RETURN * _RATE * moved, inverse)
         goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
         self._since_held += moved
         is_held = is_settled and self._left(goal) > _MISSED * self._size
+        if is_held:  # the search leads far from the pose in which the rotations were measured
+            self._inverse = None
         if is_held and self._other is not None:
             goal, is_settled = self._freed(goal, self._other)
         elif is_held and self._since_held >= _RETRY:
@@ -287,17 +306,18 @@ class Reaching:
         return self._shown(most, is_settled)
 
     def _shown(self, most: float, is_settled: bool) -> Reach:
-        """Rotate the shown pose towards the goal, by at most ``most`` about each axis."""
+        """Rotate each joint of the shown pose towards the goal, by at most ``most``."""
         # The goal may be on the other side of what the limits forbid. If possible, the joint stays
         # at the target on the way there.
         shown = self._dofs[self._rows]
         way = self._goal.values - shown
-        part = most / max(float(np.abs(way).max()), 1e-300)
+        part = most / max(self._turn(way), 1e-300)
         if part >= 1.0:
             return self._result(self._goal, is_settled)
         direct = self._goal.at(shown + part * way)
         step = self._step(direct, self._wanted - direct.place, _FIRST_DAMPING)
-        near = self._goal.at(np.clip(direct.values + step, shown - most, shown + most))
+        turned = direct.values + step - shown
+        near = self._goal.at(shown + turned * min(1.0, most / max(self._turn(turned), 1e-300)))
         come = np.linalg.norm(way) - np.linalg.norm(self._goal.values - near.values)
         is_on_way = come > 0.5 * part * np.linalg.norm(way)
         is_better = is_on_way and self._left(near) < self._left(direct)
@@ -315,6 +335,24 @@ class Reaching:
         if soft > 0.0:
             nearest += soft * (1.0 - float(np.exp(-(distance - nearest) / soft)))
         return self._base + nearest * unit(away)
+
+    def _measured(self) -> tuple[Floats, Floats]:
+        """Return G (N, N), and its inverse: a change d of the DOFs rotates by sqrt(d^T G d)."""
+        angles = self._dofs[self._rows][:, None, None]
+        turns = np.sin(angles) * self._cross + (1.0 - np.cos(angles)) * self._square
+        turns += _IDENTITY[:3, :3]
+        axes, after = self._axes.copy(), _IDENTITY[:3, :3]
+        for row in range(len(axes) - 1, -1, -1):
+            # Where the next joint begins, ``after`` rotates all axes of it, which changes no angle.
+            axes[row] = after[:, self._kinds[row]]
+            after = after.dot(turns[row])
+        metric = axes @ axes.T * self._is_same_joint + _ASIDE * np.eye(len(axes))
+        return metric, np.linalg.inv(metric)
+
+    def _turn(self, change: Floats) -> float:
+        """Return the largest rotation of a joint for a change of the DOFs (N,)."""
+        squares = np.bincount(self._of_joint, change * (self._metric @ change))
+        return math.sqrt(float(squares.max()))
 
     def _result(self, state: _State, is_settled: bool) -> Reach:
         self._dofs[self._rows] = state.values
@@ -368,11 +406,13 @@ class Reaching:
         known = np.zeros(len(start)) if wish is None else wish.copy()
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (damping * self._size) ** 2 * _IDENTITY[:3, :3]
+        inverse = self._inverse
         while True:
             # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs.
             part = jacobian * free
             left = error - jacobian @ known
-            step = known + part.T @ np.linalg.solve(part @ part.T + damp, left)
+            eased = part.T if inverse is None else inverse @ part.T
+            step = known + eased @ np.linalg.solve(part @ eased + damp, left)
             largest = float(np.abs(step * free).max())
             if largest > _LARGEST_STEP:
                 step[free] *= _LARGEST_STEP / largest
@@ -382,18 +422,24 @@ class Reaching:
                 return bounded
             known[stopped] = bounded[stopped]
             free &= ~stopped
+            if inverse is not None:  # that of the metric of the DOFs that are left
+                for row in np.flatnonzero(stopped):
+                    inverse = inverse - np.outer(inverse[:, row], inverse[row]) / inverse[row, row]
 
-    def _returned(self, state: _State, most: float) -> _State:
+    def _returned(self, state: _State, most: float, inverse: Floats) -> _State:
         """Return a state nearer to the pose at the start, if that leaves the joint in place.
 
         Steps by the pseudoinverse alone end in another pose after each loop of the target (Klein
         and Huang 1983), so that a limb would twist during long drags.
         """
-        wish = np.clip(self._first.values - state.values, -most, most)
+        # Downhill in the squared difference of DOFs, in the metric of the rotations.
+        downhill = inverse @ (self._first.values - state.values) / inverse.diagonal().max()
+        wish = np.clip(downhill, -most, most)
         if not wish.any():
             return state
         nearer = state.at(state.values + self._step(state, np.zeros(3), self._damping, wish))
-        return nearer if self._left(nearer) <= self._left(state) else state
+        is_in_place = math.dist(nearer.place, state.place) <= _MISSED * self._size
+        return nearer if is_in_place or self._left(nearer) <= self._left(state) else state
 
     def _freed(self, state: _State, other: _State) -> tuple[_State, bool]:
         """Return another state if it is nearer than one that is held, and whether it is settled."""
