@@ -425,14 +425,25 @@ def test_npz_keeps_correctives(rigged, tmp_path):
     assert again.correctives is not None and len(again.fields) == 3
 
 
-def test_gltf_contains_the_figure_at_rest(rigged, tmp_path):
+def test_gltf_contains_the_figure_at_rest_on_the_ground_of_the_mesh(rigged, tmp_path):
     _, found = rigged
-    lines = faults.lines(write_rigged(found, tmp_path / "arm.glb"))
-    assert lines[-2] == "the figure is at rest: .npz and .skel also store the target's pose"
+    pose = found.pose.copy()
+    pose.dofs[:6] += 0.5
+    pose.figure_translation = 0.3, 0.2, -0.1
+    lines = faults.lines(write_rigged(replace(found, pose=pose), tmp_path / "arm.glb"))
+    assert lines[-2].startswith("the figure is in the template's rest pose, on the ground of the ")
     actor = viewer.load(tmp_path / "arm.glb").actors[0]
-    plain = without_correctives(found)
-    assert actor.figure.require_skeleton().n_joints == plain.skeleton.n_joints
-    wanted = deform(plain, rest_pose(plain.skeleton))[0]
+    plain = without_correctives(replace(found, pose=pose))
+    skeleton = actor.figure.require_skeleton()
+    assert skeleton.n_joints == plain.skeleton.n_joints
+    target, at_rest = (deform(plain, each)[0] for each in (pose, rest_pose(plain.skeleton)))
+    lift = [0.3, target[:, 1].min() - at_rest[:, 1].min(), -0.1]
+    assert abs(lift[1] - 0.2) > 0.1  # the root's pose moves the lowest point, too
     # The file has single precision.
-    assert_allclose(deform(actor.figure, actor.pose)[0], wanted, rtol=0, atol=1e-6)
+    assert_allclose(deform(actor.figure, actor.pose)[0], at_rest + lift, rtol=0, atol=1e-6)
+    # Joints and bindings move with the mesh.
+    joints, moved = (world_matrices(each, rest_pose(each)) for each in (plain.skeleton, skeleton))
+    assert_allclose(moved[:, :3, 3], joints[:, :3, 3] + lift, rtol=0, atol=1e-6)
+    bound = np.linalg.inv(actor.figure.skin.inverse_bind)[:, :3, 3]
+    assert_allclose(bound, np.linalg.inv(plain.skin.inverse_bind)[:, :3, 3] + lift, atol=1e-6)
     assert files_of(tmp_path / "arm.gltf") == [tmp_path / "arm.gltf", tmp_path / "arm.bin"]

@@ -15,10 +15,12 @@ from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import Remedy, counted
-from viewer.rigs.arrays import Arrays
+from viewer.rigs.arrays import Arrays, Floats
 from viewer.rigs.figure import Figure, figure_pose
+from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.mesh import vertex_normals
-from viewer.rigs.pose import Pose
+from viewer.rigs.pose import Pose, placement_matrix
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights
 from viewer.rigs.skin import influence_counts, limit_influences
@@ -28,6 +30,7 @@ RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 """Suffixes that ``files_of`` accepts without further data; ``.vrm`` needs an author."""
 
 _RIG = (".skel", ".skin", ".obj", ".json")
+_SAME = 1e-6  # distance below which a figure at rest is the mesh, relative to its size
 _NODES = (".glb", ".gltf", ".vrm")
 USUAL_INFLUENCES = 4
 """Influences per vertex that game engines and web viewers read of such files."""
@@ -69,14 +72,18 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:
+        target = deform(figure, rigged.pose)[0]
+        figure = _standing(figure, target, rigged.pose)
+        moved = np.abs(deform(figure)[0] - target).max()
         figure, limited = _limited(figure, rigged.max_influences)
         notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
-        notes.append(
-            Diagnostic(
-                "X003.rigged-pose: the figure is at rest: .npz and .skel also store the target's "
-                "pose"
+        if moved > _SAME * np.ptp(target, axis=0).max():
+            notes.append(
+                Diagnostic(
+                    "X003.rigged-pose: the figure is in the template's rest pose, on the ground of "
+                    "the mesh: .npz and .skel also store the pose of the mesh"
+                )
             )
-        )
         notes += limited
         if rigged.figure.correctives is not None:
             notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
@@ -92,6 +99,31 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     if rigged.figure.correctives is not None:
         notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
     return notes
+
+
+def _standing(figure: Figure, target: Floats, pose: Pose) -> Figure:
+    """Return a figure without correctives that at rest stands where the mesh (V, 3) in a pose does.
+
+    The root of a template may be at the origin, and its feet far below the ground. Joints, bindings
+    and mesh move together, so that every program shows the figure beside the mesh it was made of.
+    """
+    skeleton, skin, mesh = figure.require_skeleton(), figure.require_skin(), figure.require_mesh()
+    rest, up = figure_pose(figure), axis_vector(figure.up)
+    rest.figure_scale, rest.figure_translation = pose.figure_scale, pose.figure_translation
+    # The placement T(t) S(s), which follows skinning, moves to the roots: P M B v = (P M) (B P^-1)
+    # (P v).
+    place = placement_matrix(rest)
+    place[:3, 3] += ((target @ up).min() - (deform(figure, rest)[0] @ up).min()) * up
+    roots = skeleton.parents < 0
+    translations, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
+    translations[roots] = apply_transform(place, translations[roots])
+    scales[roots] *= rest.figure_scale
+    return replace(
+        figure,
+        mesh=replace(mesh, positions=apply_transform(place, mesh.positions)),
+        skeleton=replace(skeleton, rest_translations=translations, rest_scales=scales),
+        skin=replace(skin, inverse_bind=skin.inverse_bind @ np.linalg.inv(place)),
+    )
 
 
 def _limited(figure: Figure, requested: int | None) -> tuple[Figure, list[Diagnostic]]:
