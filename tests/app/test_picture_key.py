@@ -57,7 +57,7 @@ def another(owner, name):
         return not value
     if isinstance(value, int | float):
         most = facts.get("limits", (0.0, np.inf))[1]
-        return value + 1 if value + 1 <= most else value - 0.25
+        return value + 1 if value + 1 <= most else value / 2
     if isinstance(value, str):
         return f"{value} else"
     return (0, 0, 0) if value != (0, 0, 0) else None
