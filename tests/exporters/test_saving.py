@@ -23,7 +23,15 @@ from viewer import formats
 from viewer.autorig.pipeline import transfer
 from viewer.cli import run
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
-from viewer.exporters import EXPORTERS, ExportOptions, Part, Selection, export, output_files
+from viewer.exporters import (
+    EXPORTERS,
+    ExportOptions,
+    Part,
+    Selection,
+    VrmMeta,
+    export,
+    output_files,
+)
 from viewer.exporters._rigged_files import files_of, without_correctives, write_rigged
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
@@ -423,6 +431,19 @@ def test_npz_keeps_correctives(rigged, tmp_path):
     ]
     again = viewer.load(tmp_path / "arm.npz").actors[0].figure
     assert again.correctives is not None and len(again.fields) == 3
+
+
+def test_vrm_contains_the_figure_at_the_origin_wherever_the_mesh_is(rigged, tmp_path):
+    body = viewer.load("body").actors[0].figure
+    pose = figure_pose(body)
+    pose.figure_translation = 3.0, 2.0, -1.0
+    meta = VrmMeta(authors=("Ada",), licence="https://vrm.dev/licenses/1.0/")
+    found = replace(rigged[1], figure=body, pose=pose)
+    lines = faults.lines(write_rigged(found, tmp_path / "body.vrm", meta))
+    assert any("in the template's rest pose, at the origin" in line for line in lines)
+    positions = viewer.load(tmp_path / "body.vrm").actors[0].vertices()[0]
+    middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
+    assert np.abs(middle[[0, 2]]).max() < 0.2 and abs(positions[:, 1].min()) < 0.04
 
 
 def test_gltf_contains_the_figure_at_rest_on_the_ground_of_the_mesh(rigged, tmp_path):

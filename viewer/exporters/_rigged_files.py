@@ -73,17 +73,21 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:
         target = deform(figure, rigged.pose)[0]
-        figure = _standing(figure, target, rigged.pose)
+        key = (
+            "X003.rigged-vrm-pose: the figure is in the template's rest pose, at the origin: .npz "
+            "and .skel also store the pose of the mesh"
+        )
+        if output.suffix.lower() != ".vrm":  # whose exporter puts figures on the ground itself
+            figure = _standing(figure, target, rigged.pose)
+            key = (
+                "X003.rigged-pose: the figure is in the template's rest pose, on the ground of the "
+                "mesh: .npz and .skel also store the pose of the mesh"
+            )
         moved = np.abs(deform(figure)[0] - target).max()
         figure, limited = _limited(figure, rigged.max_influences)
         notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
         if moved > _SAME * np.ptp(target, axis=0).max():
-            notes.append(
-                Diagnostic(
-                    "X003.rigged-pose: the figure is in the template's rest pose, on the ground of "
-                    "the mesh: .npz and .skel also store the pose of the mesh"
-                )
-            )
+            notes.append(Diagnostic(key))
         notes += limited
         if rigged.figure.correctives is not None:
             notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
