@@ -1,6 +1,7 @@
 """Jobs for workers of test clusters."""
 
 import os
+import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +10,12 @@ from viewer.batching.items import Item, Result
 from viewer.batching.worker_process import worker_rank
 from viewer.errors import OutputError
 from viewer.media.output_checks import check_targets
+from viewer.media.unfinished import temporary_prefix
 
 
 @dataclass
 class Job:
-    """Append a line to the file of an item; some names crash, hang or fail."""
+    """Append a line to the file of an item; some names crash, hang, fail or are killed once."""
 
     uses_gpu: bool = False
     seconds: float = 0.0
@@ -25,6 +27,9 @@ class Job:
                 file.write(f"{os.getpid()}\n")
         if item.name == "crash":
             os._exit(3)
+        if item.name == "killed" and len(Path(item.output).read_text().split()) == 1:
+            half_written(item.output).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
         if item.name == "hang":
             time.sleep(60)
         if item.name == "raise":
@@ -43,6 +48,11 @@ class Careful(Job):
         except OutputError as problem:
             return Result(item, "failed", 5, message=str(problem))
         return super().__call__(item)
+
+
+def half_written(output: str) -> Path:
+    """Return the temporary file that a process leaves when it is killed while it writes."""
+    return Path(output).with_name(f"{temporary_prefix(Path(output).name)}abcd0123")
 
 
 def read_nothing(item: Item) -> Result:
