@@ -2,8 +2,8 @@
 
 Prints Markdown tables like those of ``../shared/research/rigging.md``, for the characters in
 ``../shared/data/rigging``. All lengths are percentages of the longest side, times are processor
-seconds. Names select characters; ``--sheets FOLDER`` draws five poses of each, the artist's above
-ours.
+seconds. Names select characters; ``--sheets FOLDER`` draws a picture of each: its skeletons at rest
+and the poses in which it is measured, the artist's on the left, ours on the right.
 
 - Humanoids and quadrupeds, rigged from the bundled body and fox, measured by ``evaluate_rig.py``:
   distance of joints with a common meaning, L1 distance of weights by body part, same dominant part,
@@ -18,6 +18,7 @@ ours.
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +33,13 @@ from viewer.autorig.settings import BINDING
 from viewer.errors import RigError
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.media.image import save_image
+from viewer.media.picture_sinks import write_label
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import translation_matrix
 from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, Scene
+from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.skinning import joint_matrices
 
 # Of the joint error (median of humanoids, mean of quadrupeds) and the mean deformation, percent of
@@ -64,7 +67,10 @@ SHAPE_TABLE = (
 # Random poses of other shapes: their number, rotation of each joint about each axis in radians
 # (22 degrees in all), vertices that are fitted, steps, and how much a rotation costs.
 _POSES, _TURN, _FITTED, _STEPS, _DAMPING = 4, 0.22, 2500, 8, 1e-6
-_GAP = 1.1  # distance between the poses of a sheet, relative to the figure's size
+# Sheets: distance between the artist's figure and ours relative to their width, azimuth and
+# inclination of the camera, degrees, pixels of a picture, pictures in a row, and the height in
+# which their names are written, pixels.
+_GAP, _VIEW, _PICTURE, _ACROSS, _LABEL = 1.1, (20.0, 8.0), (600, 450), 3, 180
 
 
 def main() -> None:
@@ -109,13 +115,15 @@ def main() -> None:
             cells = name, len(truth["V"]), *row, f"{rig['confidence']:.2f}", f"{taken:.1f}"
             print("| " + " | ".join(map(str, cells)) + " |", flush=True)
             if given.sheets is not None:
-                given.sheets.mkdir(parents=True, exist_ok=True)
-                save_image(given.sheets / f"{name}.png", _sheet(evaluate_rig, truth, rig))
+                _save_sheet(
+                    given.sheets / f"{name}.png", truth, rig, _posed(evaluate_rig, truth, rig)
+                )
         if scores:
             _summarise(scores, is_quadruped)
     others = {name: path for name, path in paths.items() if truths.get(name, ...) is None}
     others |= {path.stem: path for path in sorted((CHARACTERS / "animated").glob("*.glb"))}
-    _print_shapes(evaluate_rig, {n: p for n, p in others.items() if n in (given.names or others)})
+    chosen = {name: path for name, path in others.items() if name in (given.names or others)}
+    _print_shapes(evaluate_rig, chosen, given.sheets)
     print(f"\nrefused: {', '.join(refused) or 'none'}")
 
 
@@ -147,7 +155,7 @@ def _on_true_joints(evaluate_rig, truth, path: Path) -> str:
     return " / ".join(found)
 
 
-def _print_shapes(evaluate_rig, shapes: dict[str, Path]) -> None:
+def _print_shapes(evaluate_rig, shapes: dict[str, Path], sheets: Path | None) -> None:
     """Print the table of skeletons that are found in the mesh."""
     found = []
     for name, path in shapes.items():
@@ -172,7 +180,10 @@ def _print_shapes(evaluate_rig, shapes: dict[str, Path]) -> None:
                 (truth, {"J": places, "W": weights})]  # fmt: skip
         size = float(np.ptp(truth["V"], axis=0).max())
         distance = evaluate_rig.cdj2j(*live, size)
-        left, moved = left_of_poses(evaluate_rig, truth, (places, parents, weights))
+        rig = {"J": places, "parents": parents, "W": weights}
+        left, moved, posed = left_of_poses(evaluate_rig, truth, rig)
+        if sheets is not None:
+            _save_sheet(sheets / f"{name}.png", truth, rig, posed)
         found.append((distance, left))
         cells = (
             name, len(truth["V"]), f"{len(places)} / {len(truth['J'])}", f"{distance:.1f}",
@@ -213,32 +224,33 @@ def _weights_of(skin) -> np.ndarray:
     return sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape).toarray()
 
 
-def left_of_poses(evaluate_rig, truth, rig) -> tuple[float, float]:
+def left_of_poses(evaluate_rig, truth, rig) -> tuple[float, float, dict[str, list[np.ndarray]]]:
     """Return how far the best pose of a rig is from random poses of the artist's, and these from
-    the mesh at rest, as percentages of the longest side.
-
-    ``rig``: joint positions (J, 3), parents (J,) and weights (V, J).
+    the mesh at rest, as percentages of the longest side; and the vertices of both in each pose.
     """
     random, middle = np.random.default_rng(0), truth["V"].mean(axis=0)
     positions, size = truth["V"] - middle, float(np.ptp(truth["V"], axis=0).max())
     chosen = random.permutation(len(positions))[:_FITTED]
-    places, parents, weights = rig
-    left, moved = [], []
-    for _ in range(_POSES):
+    left, moved, posed = [], [], {}
+    for number in range(_POSES):
         turns = {
             joint: Rotation.from_rotvec(random.normal(0.0, _TURN, 3)).as_matrix()
             for joint in np.flatnonzero(truth["parents"] >= 0)
         }
         worlds = evaluate_rig.globals_(truth["J"] - middle, truth["parents"], turns)
-        goal = evaluate_rig.lbs(positions[chosen], truth["W"][chosen], worlds)
-        fitted = _best_pose(positions[chosen], goal, places - middle, parents, weights[chosen])
-        left.append(np.linalg.norm(fitted - goal, axis=1).mean())
-        moved.append(np.linalg.norm(positions[chosen] - goal, axis=1).mean())
-    return 100.0 * float(np.mean(left)) / size, 100.0 * float(np.mean(moved)) / size
+        goal = evaluate_rig.lbs(positions, truth["W"], worlds)
+        moves = _best_pose(
+            positions[chosen], goal[chosen], rig["J"] - middle, rig["parents"], rig["W"][chosen]
+        )
+        fitted = evaluate_rig.lbs(positions, rig["W"], moves)
+        left.append(np.linalg.norm(fitted - goal, axis=1)[chosen].mean())
+        moved.append(np.linalg.norm(positions - goal, axis=1)[chosen].mean())
+        posed[f"random pose {number + 1}"] = [goal, fitted]
+    return 100.0 * float(np.mean(left)) / size, 100.0 * float(np.mean(moved)) / size, posed
 
 
 def _best_pose(rest, goal, places, parents, weights) -> np.ndarray:
-    """Return the vertices (V, 3) of the pose of a rig that is nearest to a goal.
+    """Return the motion (J, 4, 4) of each joint from rest to the pose of a rig nearest to a goal.
 
     Gauss-Newton steps over the rotations of all joints and the translation of the root, from rest.
     """
@@ -248,7 +260,7 @@ def _best_pose(rest, goal, places, parents, weights) -> np.ndarray:
         above[joint] |= above[parents[joint]]
     turns, shift = np.tile(np.eye(3), (count, 1, 1)), (goal - rest).mean(axis=0)
     damping = _DAMPING * len(rest) * float(np.ptp(rest, axis=0).max()) ** 2
-    best, least = rest + shift, np.inf
+    best, least = np.tile(np.eye(4), (count, 1, 1)), np.inf
     for _ in range(_STEPS):
         origins = np.empty_like(places)
         for joint, parent in enumerate(parents):
@@ -260,7 +272,9 @@ def _best_pose(rest, goal, places, parents, weights) -> np.ndarray:
         posed = np.einsum("vj,vja->va", weights, each)
         error = float(np.linalg.norm(goal - posed, axis=1).mean())
         if error < least:
-            best, least = posed, error
+            best, least = best.copy(), error
+            best[:, :3, :3] = turns
+            best[:, :3, 3] = origins - np.einsum("jab,jb->ja", turns, places)
         # Rotating joint k by w moves a vertex by w x sum of its weights below k times its place
         # relative to k.
         total = weights @ above
@@ -312,24 +326,53 @@ def rigged(evaluate_rig, truth, template: Figure, is_quadruped: bool):
     }
 
 
-def _sheet(evaluate_rig, truth, rig) -> np.ndarray:
-    """Return a picture of the five poses: the artist's rig above, ours below."""
+def _posed(evaluate_rig, truth, rig) -> dict[str, list[np.ndarray]]:
+    """Return the vertices in each of the five poses, by the artist's rig and ours."""
     is_quadruped = "fup_l" in truth["sem"]
     frame = evaluate_rig.frame(truth["J"], truth["sem"], is_quadruped)
-    size = float(np.ptp(truth["V"], axis=0).max())
-    actors = []
-    for row, body in enumerate((truth, rig)):
-        for column, pose in enumerate(evaluate_rig.poses(frame, is_quadruped).values()):
+    found = {}
+    for name, pose in evaluate_rig.poses(frame, is_quadruped).items():
+        found[name] = []
+        for body in (truth, rig):
             turned = {body["sem"][key]: turn for key, turn in pose.items() if key in body["sem"]}
             moves = evaluate_rig.globals_(body["J"], body["parents"], turned)
-            triangles = truth["F"].astype(np.int32)
-            posed = evaluate_rig.lbs(truth["V"], body["W"], moves)
-            mesh = Mesh(posed, vertex_normals(posed, triangles), triangles)
-            place = translation_matrix(_GAP * size * np.array([column, -row, 0.0]))
-            actors.append(Actor(Figure(f"{row} {column}", mesh), placement=place))
-    return viewer.render(
-        Scene(actors), (1600, 720), azimuth=20.0, inclination=8.0, orthographic=True
-    )
+            found[name].append(evaluate_rig.lbs(truth["V"], body["W"], moves))
+    return found
+
+
+def _save_sheet(path: Path, truth, rig, posed: dict[str, list[np.ndarray]]) -> None:
+    """Draw the skeletons at rest and poses, the artist's on the left and ours on the right."""
+    triangles = truth["F"].astype(np.int32)
+    turn, inclination = _VIEW
+    right = np.array([np.cos(np.radians(turn)), 0.0, -np.sin(np.radians(turn))])
+
+    def picture(name: str, both: list[np.ndarray], skeletons: Sequence[Skeleton | None]):
+        actors, step = [], _GAP * max(float(np.ptp(each @ right)) for each in both)
+        for column, (positions, skeleton) in enumerate(zip(both, skeletons, strict=True)):
+            mesh = Mesh(positions, vertex_normals(positions, triangles), triangles)
+            place = translation_matrix(column * step * right)
+            figure = Figure(f"{name} {column}", mesh, skeleton)
+            actors.append(Actor(figure, placement=place))
+        shown = "both" if skeletons[0] is not None else "skin"
+        pixels = viewer.render(
+            Scene(actors), _PICTURE, azimuth=turn, inclination=inclination, orthographic=True,
+            grid=False, background="white", quality="draft", show=shown,
+        ).copy()  # fmt: skip
+        write_label(pixels[-_LABEL:], name)
+        return pixels
+
+    skeletons = [
+        parts_of({"names": range(len(body["J"])), **body, "V": truth["V"], "F": truth["F"]},
+                 body["parents"])[0]
+        for body in (truth, rig)
+    ]  # fmt: skip
+    pictures = [picture(f"{path.stem}: artist, ours", [truth["V"]] * 2, skeletons)]
+    pictures += [picture(name, both, (None, None)) for name, both in posed.items()]
+    blank = np.full_like(pictures[0], 255)
+    pictures += [blank] * (-len(pictures) % _ACROSS)
+    rows = [np.hstack(pictures[i : i + _ACROSS]) for i in range(0, len(pictures), _ACROSS)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_image(path, np.vstack(rows))
 
 
 if __name__ == "__main__":
