@@ -243,6 +243,18 @@ def test_target_without_triangles_is_refused():
     assert str(problem.value) == "expected a target with triangles, found none"
 
 
+@pytest.mark.parametrize("method", ["robust", "heat"])
+def test_target_with_huge_coordinates_is_refused(method):
+    figure, pose = bent_arm()
+    huge = replace(figure.mesh, positions=1e30 * figure.mesh.positions)
+    with pytest.raises(RigError) as problem:
+        transfer(figure, pose, huge, TransferSettings(method=method))
+    largest = float(np.abs(huge.positions).max())
+    assert str(problem.value) == (
+        f"expected a target with coordinates up to 1e+09, found {largest:.3g}; scale the mesh"
+    )
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

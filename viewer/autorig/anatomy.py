@@ -175,7 +175,7 @@ def anatomies_of(
     """Find the anatomy of a mesh for each plane that may be the sagittal one, the best first."""
     with part_of_work(span=(0.0, 0.3)):
         solid = solid_within(positions, triangles)
-    report_fraction(0.3, "anatomy")
+    report_fraction(0.3, "finding limbs")
     planes = sagittal_planes(solid, up, lateral)
     paths, found = Paths(solid), []
     for number, plane in enumerate(planes):
@@ -200,12 +200,12 @@ def _divided(
     distances, _, sources = csgraph.dijkstra(
         steps, indices=middle, min_only=True, return_predecessors=True
     )
-    report_fraction(0.3, "anatomy")
+    report_fraction(0.3, "finding limbs")
     size = float(solid.spacing * np.ptp(solid.voxels, axis=0).max())
     known = np.where(np.isfinite(distances), distances, 0.0)
     tips = LevelSets(steps, known, solid.spacing).tips(_is_limb).rows
     tips = tips[distances[tips] >= _PROMINENT * size]
-    report_fraction(0.7, "anatomy")
+    report_fraction(0.7, "finding limbs")
     limbs = [
         Limb(
             centers[path],
@@ -216,7 +216,7 @@ def _divided(
         for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
     ]
     pairs = paired(limbs, sides[tips] > 0.0, lateral, offset, size, _POSED)[:_MOST_PAIRS]
-    report_fraction(1.0, "anatomy")
+    report_fraction(1.0, "finding limbs")
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
 

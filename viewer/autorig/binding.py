@@ -84,7 +84,7 @@ def enclosed(target: Mesh) -> tuple[Welded, Solid]:
 
 def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
     """Bind a mesh to the posed skeleton of a figure; see ``transfer``, which checks the mesh."""
-    report_fraction(0.0, "voxels")
+    report_fraction(0.0, "finding the inside")
     with part_of_work(span=(0.0, 0.2)):
         mesh, solid = enclosed(target)
     skeleton = shaped_skeleton(source, pose.shape_weights)

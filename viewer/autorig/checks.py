@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.autorig.transfer.joint_transfer import outside
 from viewer.diagnostics import Diagnostic, note
+from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
@@ -19,6 +20,23 @@ from viewer.rigs.skeleton import joint_label
 from viewer.rigs.skinning import deform, joint_matrices
 
 _EXACT = 1e-4  # ratio of residual to size above which a warning is given
+
+
+FARTHEST = 1e9
+"""Largest coordinate of a mesh to rig and of a landmark, in any unit. With coordinates of 1e30, the
+search for closest points excludes few triangles, and a fit takes minutes."""
+
+
+def require_target(target: Mesh) -> None:
+    """Raise ``RigError`` if a mesh cannot be rigged: it has no triangles, or is too large."""
+    if target.n_triangles == 0:
+        raise RigError("expected a target with triangles, found none")
+    largest = float(np.abs(target.positions).max())
+    if largest > FARTHEST:
+        raise RigError(
+            f"expected a target with coordinates up to {FARTHEST:g}, found {largest:.3g}; scale "
+            "the mesh"
+        )
 
 
 def newly_outside(

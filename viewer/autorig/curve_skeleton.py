@@ -35,6 +35,7 @@ from viewer.autorig.alignment.orientation_search import (
 )
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.anatomy import Limb, arc_lengths, paired, sagittal_plane
+from viewer.autorig.checks import require_target
 from viewer.autorig.medial import LevelSets, Paths, Protrusion
 from viewer.autorig.parts import MOST_PARTS, Parts, parts_of
 from viewer.autorig.settings import SkeletonSettings
@@ -43,7 +44,7 @@ from viewer.autorig.weights.bone_weights import NEAR
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
-from viewer.phrases import counted, listed, rounded
+from viewer.phrases import Remedy, counted, listed, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
@@ -883,8 +884,7 @@ def find_skeleton(
 
     ``alignment``: up axis and front, if they are known. ``target``: the mesh in the current pose.
     """
-    if target.n_triangles == 0:
-        raise RigError("expected a target with triangles, found none")
+    require_target(target)
     named = alignment.up or source.up
     # Any axis beside the up axis is a front; the usual ones are those of figures.
     usual = "x" if named[-1] == "z" else "z"
@@ -1045,7 +1045,10 @@ def joints_in(
     paths = Paths(solid)
     tree = _completed(solid, paths, rooted_tree(solid, paths, up), up, front, how.symmetry)
     if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
-        raise RigError("expected a solid with limbs, found a sheet without thickness")
+        raise RigError(
+            "expected a solid with limbs, found a sheet without thickness; "
+            f"{Remedy('place its joints by Edit skeleton', 'give it joints by --skeleton')}"
+        )
     report_fraction(0.8, "placing joints")
     if parts.count > 1:
         owners = parts.around(tree.levels)[tree.levels]

@@ -17,6 +17,7 @@ from viewer.autorig.alignment.surface_alignment import Alignment, alignment_line
 from viewer.autorig.checks import (
     check_lines,
     newly_outside,
+    require_target,
     residual_of,
     with_joint_name,
 )
@@ -58,8 +59,7 @@ def transfer(
 ) -> Rigged:
     """Rig a mesh with the rig of another figure; ``Rigged.pose`` then reproduces the mesh."""
     how = settings or TransferSettings()
-    if target.n_triangles == 0:
-        raise RigError("expected a target with triangles, found none")
+    require_target(target)
     if how.method in BINDING:
         from viewer.autorig.binding import bind
 

@@ -35,10 +35,10 @@ def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
     """
     _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
-    report_fraction(0.1, "boxes")
+    report_fraction(0.1, "matching boxes")
     box = align_boxes(target.positions, posed)
     aligned = apply_transform(box, target.positions)
-    report_fraction(0.2, "nearest vertices")
+    report_fraction(0.2, "finding nearest vertices")
     weights = nearest_weights(posed, skin, aligned)
     report_fraction(0.6, "inverse skinning")
     bound = weights.skin(skin.inverse_bind)

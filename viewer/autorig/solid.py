@@ -149,7 +149,7 @@ def solid_of(
     origin = low + spacing * (0.5 - _MARGIN + _OFFSETS)
     counts = np.ceil((high - low) / spacing).astype(int) + 2 * _MARGIN
     shape = (int(counts[0]), int(counts[1]), int(counts[2]))
-    report_fraction(0.0, "voxels")
+    report_fraction(0.0, "finding the inside")
     corners = (_outward(positions, triangles) - origin) / spacing  # in voxels
     votes = np.zeros(shape)
     for axis in range(3):

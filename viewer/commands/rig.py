@@ -23,6 +23,7 @@ import numpy as np
 
 from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings, stated_up
+from viewer.autorig.checks import FARTHEST
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.decomposition import DecompositionSettings
 from viewer.autorig.pipeline import transfer
@@ -77,7 +78,6 @@ from viewer.rigs.skinning import joint_matrices, posed_mesh
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 # Landmarks.
-_FARTHEST = 1e9  # largest coordinate, in any unit
 _LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
 
 
@@ -679,7 +679,7 @@ def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> Fo
 
 def _floats(words: list[str]) -> list[float] | None:
     found = [to_number(word.encode()) for word in words]
-    values = [value for value in found if value is not None and abs(value) < _FARTHEST]
+    values = [value for value in found if value is not None and abs(value) < FARTHEST]
     return values if len(values) == len(found) else None
 
 

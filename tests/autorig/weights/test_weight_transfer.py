@@ -205,7 +205,7 @@ def test_transfer_reports_its_progress_and_can_be_cancelled():
     assert (fractions[0], fractions[-1]) == (0.0, 1.0)
 
     def stop(done, total, unit, what):
-        if what == "factorising":
+        if what == "preparing to inpaint":
             raise Cancelled
 
     with pytest.raises(Cancelled), receiving(stop):
@@ -412,7 +412,8 @@ def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
     with pytest.raises(RigError) as caught:
         run(sparse.csr_array(dense), areas, weights, unknown)
     assert str(caught.value) == (
-        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular; try "
+        "--method nearest"
     )
 
 
@@ -434,7 +435,7 @@ def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
     with receiving(lambda *step: seen.append(step)):
         single, _ = run(operator, areas, weights, unknown)
     np.testing.assert_allclose(single.toarray(), whole.toarray(), atol=1e-12)
-    assert [step[3] for step in seen] == ["factorising"] + 3 * ["inpainting weights"]
+    assert [step[3] for step in seen] == ["preparing to inpaint"] + 3 * ["inpainting weights"]
     assert [step[:2] for step in seen] == [(0, 100), (0, 100), (33, 100), (67, 100)]
 
 
@@ -617,5 +618,6 @@ def test_rigid_part_report_counts_unnamed_parts():
 def test_no_match_reports_the_distance():
     assert nothing_matched(np.array([1.0, 3.0, 9.0]), 10.0) == (
         "no vertex of the target meets the template: expected a target aligned with it, found "
-        "it at a median distance of 30.0% of the target's size"
+        "it at a median distance of 30.0% of the target's size; use a template of the same kind "
+        "(--from), or --auto, which needs none"
     )

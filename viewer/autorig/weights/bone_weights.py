@@ -19,6 +19,7 @@ from viewer.autorig.surface.welding import Welded, stiff_islands
 from viewer.autorig.weights.weight_transfer import conjugate_gradients, factorised, scaled_rows
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
+from viewer.phrases import Remedy
 from viewer.progress import part_of_work, report, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.samples import sample_surface
@@ -474,5 +475,8 @@ def _finished(
     rows = _unit_rows(kept, where, rigid[mesh.islands[where]])
     sums = np.asarray(rows.sum(axis=1)).ravel()
     if not (sums > 0.0).all():
-        raise RigError("the weights could not be computed: the mesh is too irregular")
+        raise RigError(
+            "the weights could not be computed: the mesh is too irregular; try another "
+            f"{Remedy('Method', '--method')}"
+        )
     return BoneWeights(scaled_rows(rows, 1.0 / sums), nearest, distances, rigid)

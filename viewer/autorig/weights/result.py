@@ -9,7 +9,7 @@ import numpy as np
 from viewer.autorig.correspondence import Matches
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
-from viewer.phrases import agree, counted
+from viewer.phrases import Remedy, agree, counted
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.closest_point import SurfacePoints
 from viewer.rigs.skin import Skin
@@ -66,12 +66,18 @@ class WeightTransfer:
         return Skin(self.starts, self.joints, self.weights, inverse_bind)
 
 
+_OTHERS = Remedy(
+    "choose a template of the same kind, or From shape, which needs none",
+    "use a template of the same kind (--from), or --auto, which needs none",
+)
+
+
 def nothing_matched(distances: Floats, size: float) -> str:
     """Return the message for a target that does not meet the template anywhere."""
     far = float(np.median(distances)) / size
     return (
         "no vertex of the target meets the template: expected a target aligned with it, found "
-        f"it at a median distance of {far:.1%} of the target's size"
+        f"it at a median distance of {far:.1%} of the target's size; {_OTHERS}"
     )
 
 

@@ -34,6 +34,7 @@ from viewer.autorig.weights.result import (
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import note
 from viewer.errors import RigError
+from viewer.phrases import Remedy
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.closest_point import SurfacePoints, interpolate
@@ -243,7 +244,7 @@ def inpaint(
     rows = laplacian[wanted]
     energy = sparse.csr_array(rows + rows @ sparse.diags_array(1.0 / areas) @ laplacian)
     border, harmonic_border = energy[:, given], rows[:, given]
-    report_fraction(0.0, "factorising")
+    report_fraction(0.0, "preparing to inpaint")
     for method, matrix, known in (
         ("direct", energy[:, wanted], border),
         ("shifted", _shifted(energy[:, wanted]), border),
@@ -255,7 +256,8 @@ def inpaint(
         if solve is not None and _is_true(solve, known):
             return _solved(solve, known, weights[given]), method
     raise RigError(
-        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular; try "
+        f"{Remedy('the method nearest', '--method nearest')}"
     )
 
 
