@@ -13,14 +13,11 @@ from scipy.spatial import ConvexHull
 import viewer
 from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.curve_skeleton import (
-    Chain,
-    Tree,
-    _Plane,
-    distinct_places,
-    find_skeleton,
-    paired_chains,
-)
+from viewer.autorig.curve_skeleton import distinct_places, find_skeleton
+from viewer.autorig.limbs import tree as limb_tree
+from viewer.autorig.limbs.joints import bones_inside
+from viewer.autorig.limbs.sides import Plane, paired_chains
+from viewer.autorig.limbs.tree import Chain, Tree
 from viewer.autorig.medial import Protrusion
 from viewer.autorig.parts import parts_of
 from viewer.autorig.settings import SkeletonSettings
@@ -113,7 +110,7 @@ def test_legs_near_the_plane_of_symmetry_are_pairs():
     tree = Tree(
         np.array([[0.0, 0.5, 0.0]]), np.array([0.2]), row, chains, (row,) * 3, np.zeros((0, 3)), row
     )
-    plane = _Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
+    plane = Plane(np.array([1.0, 0, 0]), 0.0, np.array([0.0, 1, 0]))
     assert paired_chains(tree, plane, 0.02, 1.0) == {0: 1, 1: 0}
 
 
@@ -280,9 +277,9 @@ def test_straight_bone_gets_no_joints_even_outside(height):
     # The path itself is outside at a height of 3: no joint on it brings the bone inside.
     positions, triangles = box((0, 0, 0), (1, 1, 1))
     points = np.array([[0.0, height, 0.1], [1.0, height, 0.1]])
-    chain = curve_skeleton.Chain(0, -1, points, 0.05, 0.0, frozenset({0}))
+    chain = Chain(0, -1, points, 0.05, 0.0, frozenset({0}))
     solid = solid_of(positions, triangles, 24)
-    lengths = curve_skeleton.bones_inside(chain, np.array([0.3, 1.0]), solid)
+    lengths = bones_inside(chain, np.array([0.3, 1.0]), solid)
     assert lengths.tolist() == [0.3, 1.0]
 
 
@@ -443,22 +440,22 @@ def test_corners_of_a_cut_are_no_limbs():
         _widths=np.array([0.1, 0.1]), _least=0.05, cuts=np.array([[1.0, 0, 0]]),
         _cut_widths=[0.2], _middles=np.array([[0.9, 0, 0], [3.0, 0, 0]]),
     )  # fmt: skip
-    near._is_at_cut = lambda found: curve_skeleton._Field._is_at_cut(near, found)
-    assert not curve_skeleton._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (0,), ()))
+    near._is_at_cut = lambda found: limb_tree._Field._is_at_cut(near, found)
+    assert not limb_tree._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (0,), ()))
     # Neither is one that begins elsewhere, nor a longer one, a corner.
-    assert curve_skeleton._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (1,), ()))
-    assert curve_skeleton._Field._is_limb(near, Protrusion(0, 1.5, 0.8, (0,), ()))
+    assert limb_tree._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (1,), ()))
+    assert limb_tree._Field._is_limb(near, Protrusion(0, 1.5, 0.8, (0,), ()))
 
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
     field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
-    assert curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.6, (0,)),)))
+    assert limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.6, (0,)),)))
     # The corner of a fan, as a bird's tail, is no limb.
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.75, (0,)),)))
-    assert not curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ()))
+    assert not limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.75, (0,)),)))
+    assert not limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ()))
     # A leg that met a corner of its own foot first is one all the same.
     met = (0.75, (0,)), (0.6, (0,))
-    assert curve_skeleton._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), met))
+    assert limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), met))
 
 
 def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):
@@ -644,7 +641,7 @@ def test_small_parts_of_a_limb_have_hinges_too(monkeypatch):
 
 
 def test_more_loops_than_are_cut_are_reported(monkeypatch):
-    monkeypatch.setattr(curve_skeleton, "_MOST_LOOPS", 1)
+    monkeypatch.setattr(limb_tree, "_MOST_LOOPS", 1)
     angles = np.linspace(0.0, 2 * np.pi, 25)
     ring = pipe(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), 0.1)
     both = found(united(ring, (ring[0] + [1.9, 0, 0], ring[1]))).lines

@@ -1,0 +1,1 @@
+"""Limbs of a solid: their tree outwards from the trunk, their joints, pairs and names."""
