@@ -25,6 +25,7 @@ PATIENCE = 60.0  # timeout of an expected event in seconds
 # A threshold of processor time in milliseconds. A frame drawn in software takes several times
 # longer; waking up to check the clock takes a tenth of it.
 A_FRAME = 8.0
+LONGEST_SLEEP = 0.6  # seconds in which a window that is not asleep draws a frame
 
 
 def _wait_for(condition, what):
@@ -110,14 +111,23 @@ class Window:
         return np.asarray(ImageGrab.grab(xdisplay=self.display))
 
     def wait_until_quiet(self, still=0.25):
-        """Return the screen once it shows the figure and has not changed for ``still`` seconds."""
-        last = [self.screen(), time.monotonic()]
+        """Return the screen once it shows the figure and has not changed for ``still`` seconds.
+
+        On a busy machine, a window may draw no frame for longer than that: half of these seconds
+        must be its own processor time, unless it sleeps.
+        """
+        last, looks = None, []
 
         def is_quiet():
-            now = self.screen()
-            if (now != last[0]).any() or now.max() == 0:
-                last[:] = now, time.monotonic()
-            return now if time.monotonic() - last[1] > still else None
+            nonlocal last
+            screen, now, used = self.screen(), time.monotonic(), self.milliseconds_of_cpu()
+            looks.append((now, used))
+            if last is None or (screen != last[0]).any() or screen.max() == 0:
+                last, looks[:-1] = (screen, now, used), []
+            before = [each for when, each in looks if when <= now - LONGEST_SLEEP]
+            is_drawn = used - last[2] > 500.0 * still
+            is_asleep = bool(before) and used - before[-1] < A_FRAME
+            return screen if now - last[1] > still and (is_drawn or is_asleep) else None
 
         return _wait_for(is_quiet, "a picture that stands still")
 
@@ -163,7 +173,7 @@ class Window:
         # CPUCLOCK_SCHED is 2).
         return 1e3 * time.clock_gettime(~self.process.pid << 3 | 2)
 
-    def is_asleep(self, seconds=0.6):
+    def is_asleep(self, seconds=LONGEST_SLEEP):
         """Return whether the window draws no frame for longer than its longest sleep."""
         before = self.milliseconds_of_cpu()
         time.sleep(seconds)

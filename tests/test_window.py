@@ -345,26 +345,29 @@ def test_vertex_text_is_complete_wherever_the_mouse_is(window, places, surface):
     (x, y, width, height), (tab, seen) = places[1], surface
     part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
     app = window()
+    opened = app.wait_until_quiet()
     app.tell("mousemove", *map(round, tab))
-    time.sleep(0.5)  # tabs are hovered before they can be pressed
+    # A tab is hovered, and drawn lighter, before it can be pressed.
+    around = np.s_[round(tab[1]) - 8 : round(tab[1]) + 8, round(tab[0]) - 8 : round(tab[0]) + 8]
+    _wait_for(lambda: (app.screen()[around] != opened[around]).any(), "a hovered tab")
     app.drag(tab, tab)
-    time.sleep(0.5)
+    app.wait_until_changed(opened, (x + width + 5, y + 50, SIZE[0] - x - width - 5, 200))
     beside = round(x + 15), round(y + 0.4 * height)
     app.tell("mousemove", *beside)
     _wait_for(app.is_asleep, "messages to go")
-    empty = app.screen()[part]
+    empty = app.screen()
     for place in seen[:: max(len(seen) // 3, 1)][:3]:
         app.tell("mousemove", *beside)
-        time.sleep(0.5)
+        app.wait_until_shown(empty, part)
         app.tell("mousemove", place[0] - 3, place[1])
         app.tell("mousemove", *place)
         _wait_for(
-            lambda: (app.screen()[part] != empty).any(axis=-1).sum() > 5000 or None,
+            lambda: (app.screen()[part] != empty[part]).any(axis=-1).sum() > 5000,
             "a text of several lines",
         )
         _wait_for(app.is_asleep, "an idle processor")
         shown = app.screen()[part]
-        assert (shown != empty).any(axis=-1).sum() > 5000
+        assert (shown != empty[part]).any(axis=-1).sum() > 5000
         app.key("shift")  # has no effect, but triggers frames
         _wait_for(app.is_asleep, "an idle processor")
         assert (app.screen()[part] == shown).all()
