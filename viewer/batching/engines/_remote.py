@@ -94,6 +94,7 @@ def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVer
             if not all(map(os.path.isabs, filter(None, paths))):
                 return NoFolder(worker.address, problem.strerror or "")
         try:
+            job = _job(asked.job)  # not part of an item: its modules may take long to load
             start = time.monotonic()
             results, missing = [], ""
             name_worker(worker.name)
@@ -101,7 +102,7 @@ def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVer
                 limit_memory(asked.memory)
             for number, (item, since) in enumerate(items):
                 with _ended_after(asked.timeout, worker, key, number), replacing_since(since):
-                    result = _job(asked.job)(item)
+                    result = job(item)
                 results.append(result)
                 if result.status == "failed":
                     absent = (file for file in item.files if not os.path.lexists(file))
