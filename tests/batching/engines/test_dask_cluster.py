@@ -21,7 +21,7 @@ from tests.batching.engines.cluster_jobs import (
     read_nothing,
     write_elsewhere,
 )
-from viewer.batching.engines import Limits
+from viewer.batching.engines import Limits, _task_size
 from viewer.batching.engines._remote import Reply
 from viewer.batching.engines._task_size import LONGEST
 from viewer.batching.items import Result
@@ -91,7 +91,8 @@ def finished(job, some, limits, on_result=lambda result: None):
     return {result.item.index: result for result in results}
 
 
-def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path):
+def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path, monkeypatch):
+    monkeypatch.setattr(_task_size, "_MOST", 1)
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
     first = []
 
@@ -104,7 +105,7 @@ def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path):
     assert {one.status for one in found.values()} == {"done"} and first
     runs = [len(path.read_text().split()) for path in tmp_path.iterdir()]
     assert len(runs) == 60
-    # At most the items of the killed worker were run again.
+    # At most the items of the killed worker were run again: each was a task.
     assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
 
 
@@ -156,15 +157,18 @@ def test_workers_that_end_unseen_by_dask_are_replaced(monkeypatch):
     limits = Limits(2, cluster="local")
     with dask_cluster._connected(dask_cluster.parse_cluster("local"), limits) as (client, check):
         cluster = client.cluster
-        first = cluster.workers[1]
+        first, scaled, scale = cluster.workers[1], [], cluster.scale
+        monkeypatch.setattr(cluster, "scale", lambda n: scaled.append(n) or scale(n))
         monkeypatch.setattr(first, "_on_worker_exit", unseen)
         os.kill(first.pid, signal.SIGKILL)
         end = time.monotonic() + 60.0
-        while cluster.workers.get(1, first) is first or len(connected(client)) < 2:
-            assert time.monotonic() < end, cluster.workers
-            check(connected(client))
+        # Not checked once there is a new one, which may also need longer than _ABSENT to connect.
+        while cluster.workers.get(1, first) is first or connected(client) != {"0", "1"}:
+            assert time.monotonic() < end, (scaled, cluster.workers)
+            if 2 not in scaled:
+                check(connected(client))
             time.sleep(0.05)
-        assert connected(client) == {"0", "1"}
+        assert scaled == [1, 2]
 
 
 async def unseen(exit_code):
