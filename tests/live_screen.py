@@ -11,7 +11,7 @@ from viewer.app.live import Live, advance_live
 from viewer.live.server import Server
 from viewer.live.vmc import Receiver
 
-PATIENCE = 10.0  # timeout of an expected event in seconds
+PATIENCE = 60.0  # timeout of an expected event in seconds
 
 
 class Screen:
@@ -22,7 +22,7 @@ class Screen:
         self.state = make_state(scene or viewer.load())
         receiver = Receiver("127.0.0.1", 0) if vmc else None
         self.live = self.state.put(Live(self.server, receiver))
-        self.frame = threading.Lock()
+        self.frame = threading.RLock()
         """Held during a frame: a test that edits holds it as well."""
         self._is_over = False
         self._thread = threading.Thread(target=self._run)
@@ -51,9 +51,12 @@ class Screen:
         self.live.close()
 
 
-def can_undo(state):
+def can_undo(screen):
     """Return whether there was an edit of the user; it is undone."""
-    return state.history.undo(state.scene, state.options, lambda time: None)
+    state = screen.state
+    with screen.frame:
+        state.observe()
+        return state.history.undo(state.scene, state.options, lambda time: None)
 
 
 @contextmanager

@@ -213,8 +213,7 @@ def test_scene_is_replaced_and_followed(screen, live):
 def test_what_programs_send_is_no_edit(screen, live):
     live.add(bar())["joint_1"] = [0.0, 0.0, QUARTER]
     screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
-    screen.state.observe()
-    assert not can_undo(screen.state)
+    assert not can_undo(screen)
 
 
 def edit(screen, angle, index=0):
@@ -242,9 +241,7 @@ def test_pose_that_the_user_sets_is_read_in_place_and_not_sent_back(screen, live
     assert "pose" not in sent
     assert "edits" in sent
     assert is_at(screen, [1.0 + math.cos(0.5), math.sin(0.5), 0.0])()
-    with screen.frame:
-        screen.state.observe()
-        assert can_undo(screen.state)  # the edits are still those of the user
+    assert can_undo(screen)  # the edits are still those of the user
     screen.wait(is_read(live, "first", 0.0))  # undone
 
 

@@ -338,7 +338,7 @@ def test_window_is_moved_by_a_performer_and_shows_the_counts(tmp_path):
         wanted = matrix @ (0.2, 0.8, 0.0)
         screen.wait(lambda: np.allclose(scene[1].joints()[0, hand], wanted, atol=1e-4))
         screen.wait(lambda: ("VMC in", "2 packets, 1 malformed") in screen.state.stats.live)
-        assert not can_undo(screen.state)
+        assert not can_undo(screen)
 
 
 def test_scene_without_a_humanoid_is_said_once(tmp_path):

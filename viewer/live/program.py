@@ -355,8 +355,8 @@ class Live:
                 return
             except ViewerError as problem:
                 if str(problem) != self._problem:
-                    self._problem = str(problem)
                     sys.stderr.write(f"viewer: {problem}\n")
+                    self._problem = str(problem)
                 due = time.monotonic() + _RETRY_SECONDS
 
     def _lose(self) -> None:
