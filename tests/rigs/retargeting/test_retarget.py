@@ -107,6 +107,44 @@ def test_very_different_rest_pose_of_the_trunk_is_aligned():
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
 
 
+@pytest.mark.parametrize("ahead", [-8, 2, 12])
+def test_head_looks_ahead_whatever_the_slant_of_the_neck(ahead):
+    # The joint of the head is 10 cm above that of the neck, and up to 50 degrees behind or ahead.
+    slanted = figure_of({**HIK, "Head": ("Neck", (0, 160, ahead))}, "slanted")
+    source = moving(figure_of(BODY, "body"))
+    clip = retarget(source, slanted).clip
+    names = list(HIK)
+    # In the source's rest pose, the figure's own neck and head do not move.
+    for name in ("Spine", "Spine1", "Neck", "Head"):
+        np.testing.assert_allclose(
+            np.abs(clip.rotations[0, names.index(name), 3]), 1.0, atol=EXACT, err_msg=name
+        )
+    # And the head turns as the source's does in all others.
+    worlds = [
+        world_frames(each, frames_of(each, one, np.arange(5) / 30.0))[:, joint, :3, :3]
+        for each, one, joint in (
+            (source.figure, source.clip, list(BODY).index("head")),
+            (slanted, clip, names.index("Head")),
+        )
+    ]
+    np.testing.assert_allclose(worlds[1], worlds[0], atol=EXACT)
+
+
+def test_motion_of_the_same_rig_is_copied_whatever_its_rest_pose():
+    source = moving(figure_of(BODY, "body"))
+    rng = np.random.default_rng(3)
+    vectors = rng.uniform(-0.2, 0.2, (len(BODY), 3))  # less than what makes the bones differ
+    posed = replace(source.figure.skeleton, rest_rotations=quaternions(vectors))
+    for scale in (1.0, 2.0):
+        skeleton = replace(posed, rest_translations=scale * posed.rest_translations)
+        figure = Figure("bound in another pose", skeleton=skeleton)
+        for rest in ("zero", "auto"):
+            clip = retarget(source, figure, source_rest=rest).clip
+            theirs, mine = places(source.figure, source.clip), places(figure, clip)
+            for name in BODY:
+                np.testing.assert_allclose(mine[name], scale * theirs[name], atol=1e-11)
+
+
 def test_limb_directions_match_the_source_from_a_pose_to_t_pose():
     source, figure = moving(figure_of(BODY, "body")), figure_of(HIK, "mocap")
     clip = retarget(source, figure).clip

@@ -11,7 +11,7 @@ from viewer.rigs.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rigs.geometry.vectors import axes_along, axis_vector
+from viewer.rigs.geometry.vectors import axes_along, axis_vector, unit
 from viewer.rigs.kinematics import joint_worlds, world_matrices
 from viewer.rigs.pose import zero_pose
 from viewer.rigs.retargeting.joint_matches import Matches
@@ -34,6 +34,9 @@ _NATURAL = np.cos(np.radians(25.0))
 # Cosine of the maximum angle of an upright body from the up axis: the line from the hips to the
 # neck leans by as much as a spine bends.
 _UPRIGHT = np.cos(np.radians(25.0))
+
+# The same for bones of a trunk that is as upright as the other's from pelvis to head.
+_SLANTED = np.cos(np.radians(60.0))
 
 # Minimum length of bones with a reliable direction, as a fraction of the skeleton's size: far above
 # the rounding of files in single precision (6e-8), far below any bone (1e-3 for a finger's).
@@ -104,6 +107,7 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     # and feet follow the body unless they differ greatly, and the last joint of a limb follows the
     # one before it.
     whole_body = _standing(source, target, matches)
+    is_trunk_alike = _is_trunk_alike(source, target, matches, whole_body)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
     above = _matched_above(matches, parents)
     short = _SHORT * max(float(np.ptp(rest.points, axis=0).max()) for rest in (source, target))
@@ -121,10 +125,31 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
         chosen = [child for child, is_long in zip(children, long, strict=True) if is_long]
         if not chosen and matches.names[joint].endswith("_ankle"):
             reference = _with_leg(source, target, matches, int(joint), whole_body, reference)
+        slants = is_trunk_alike and matches.names[joint].startswith(_SPINE)
+        natural = _SLANTED if slants else _NATURAL
         result[joint] = _at_joint(
-            matches, int(joint), chosen, (mine[long], theirs[long]), whole_body, reference
+            matches, int(joint), chosen, (mine[long], theirs[long]), whole_body, reference, natural
         )
     return result
+
+
+def _is_trunk_alike(
+    source: RestPose, target: RestPose, matches: Matches, whole_body: Floats
+) -> bool:
+    """Return whether two bodies hold trunk and head alike: from pelvis to head, else to neck."""
+    # A single bone does not tell. Below a head that looks straight ahead, the neck slants by up to
+    # 40 degrees if it is short, or its joint at the nape: were such a bone aligned, the head would
+    # bow. The whole line is long, so the exact places of its ends matter little.
+    used = {name for name, p in zip(matches.names, matches.partners, strict=True) if p >= 0}
+    top = next((name for name in ("head", "neck") if name in used), "")
+    if "pelvis" not in used or not top:
+        return False
+    ends = [matches.names.index(name) for name in ("pelvis", top)]
+    mine, theirs = (
+        unit(np.diff(points, axis=0)[0])
+        for points in (target.points[ends], source.points[matches.partners[ends]])
+    )
+    return bool(whole_body @ mine @ theirs > _NATURAL)
 
 
 def _at_joint(
@@ -134,8 +159,12 @@ def _at_joint(
     bones: tuple[Floats, Floats],
     whole_body: Floats,
     reference: Floats,
+    natural: float,
 ) -> Floats:
-    """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation."""
+    """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation.
+
+    ``natural``: cosine of the maximum difference for which the joint keeps its bend.
+    """
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
     mine, theirs = (bone / np.linalg.norm(bone, axis=-1, keepdims=True) for bone in bones)
     # The end of a chain has no direction of its own: a head or a foot without toes moves with the
@@ -145,10 +174,11 @@ def _at_joint(
     # Spines and feet of two characters bend differently by nature. If B aligned them, a stooped
     # character would be straightened, and soles would tilt, so they keep their bend relative to the
     # body. Beyond 25 degrees, which nine of ten pairs of standing bodies keep to, the difference is
-    # due to another rest pose, as of a body with hanging feet, and is aligned.
+    # due to another rest pose, as of a body with hanging feet, and is aligned. Bones of two trunks
+    # that are alike as a whole may slant by more.
     if part.startswith(_NATURALLY_BENT):
         near = np.einsum("ab,kb,ka->k", whole_body, mine, theirs)
-        if part == "pelvis" or (near > _NATURAL).all():
+        if part == "pelvis" or (near > natural).all():
             return whole_body
     if part == "wrist":
         knuckles = _knuckles(matches, children, bones)

@@ -40,7 +40,12 @@ from viewer.rigs.retargeting.rest_alignment import (
     is_same_rest,
     rest_of,
 )
-from viewer.rigs.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
+from viewer.rigs.retargeting.source_rest import (
+    SourceRest,
+    with_rest_rotations,
+    with_source_rest,
+    with_upright_rest,
+)
 from viewer.rigs.skeleton import Skeleton, joint_label, joint_labels, scaled_skeleton
 
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
@@ -57,6 +62,9 @@ _UPRIGHT = np.cos(np.radians(40.0))
 # Lengths that forearms and shins may have, relative to upper arms and thighs. End Sites that some
 # programs put next to the joint, or anywhere, are no wrists.
 _LOWER = (0.5, 2.0)
+# Difference of offsets in the axes of their parents that digits of files explain, relative to the
+# root of the sum of their squares.
+_ONE_RIG = 1e-5
 _ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 
 
@@ -84,6 +92,14 @@ def retarget(
     matches = match_joints(source, target, joint_map, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
     rested: list[Diagnostic] = []
+    has_one_up = motion.figure.up == figure.up
+    if isinstance(source_rest, str) and has_one_up and _is_one_rig(source, target, matches):
+        # Joints of one rig have the same axes, so they have the same local rotations whatever the
+        # two files call the rest pose.
+        rotations = np.empty_like(target.rest_rotations)
+        rotations[matches.partners] = target.rest_rotations
+        motion = with_rest_rotations(motion, rotations)
+        job = _job(motion, motion.figure.require_skeleton(), (target, figure.up), matches)
     if not job.is_same:
         motion = with_upright_rest(motion)
         job = _job(motion, motion.figure.require_skeleton(), (target, figure.up), matches)
@@ -177,6 +193,19 @@ def _job(
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
     return _Job(motion.clip, source, target, rests, matches, to_target, is_same, motion.hangs)
+
+
+def _is_one_rig(source: Skeleton, target: Skeleton, matches: Matches) -> bool:
+    """Return whether joints are at the same places in the axes of their parents, up to a scale."""
+    if not matches.is_hierarchy:
+        return False
+    inner = target.parents >= 0
+    mine = target.rest_translations[inner]
+    theirs = source.rest_translations[matches.partners[inner]]
+    sizes = np.linalg.norm(mine), np.linalg.norm(theirs)
+    if min(sizes) == 0.0:
+        return False
+    return bool(np.abs(mine / sizes[0] - theirs / sizes[1]).max() < _ONE_RIG)
 
 
 def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:

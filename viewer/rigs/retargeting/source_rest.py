@@ -83,7 +83,7 @@ def with_source_rest(
             "F007.rest-asked: rest pose of {motion}: frame {frame}, as requested",
             values={**called, "frame": choice},
         )
-        return _replaced(motion, skeleton, local), [note]
+        return with_rest_rotations(motion, local), [note]
     still = rest_posture(skeleton, motion.figure.up)
     if still is None or _is_body(still):
         return motion, []
@@ -141,7 +141,7 @@ def _estimated(
             "pose is not a standing pose{remedy}",
             values={**called, "frame": frame, "pose": pose},
         )
-        return _replaced(motion, skeleton, motion.clip.rotations[row]), [note]
+        return with_rest_rotations(motion, motion.clip.rotations[row]), [note]
     notes = [
         Diagnostic(
             "F007.rest-anatomy: rest pose of {motion}: estimated from trunk, soles, knees and "
@@ -165,11 +165,12 @@ def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> Skele
     above = worlds[skeleton.parents]
     above[skeleton.parents < 0] = np.eye(3)
     local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
-    return _replaced(motion, skeleton, local)
+    return with_rest_rotations(motion, local)
 
 
-def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:
+def with_rest_rotations(motion: SkeletonMotion, local: Floats) -> SkeletonMotion:
     """Return a motion whose skeleton has other local rotations at rest: (J, 4)."""
+    skeleton = motion.figure.require_skeleton()
     rested = replace(skeleton, rest_rotations=local)
     return replace(motion, figure=replace(motion.figure, skeleton=rested))
 
