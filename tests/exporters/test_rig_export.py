@@ -219,7 +219,7 @@ def test_scale_is_baked_into_all_lengths(tmp_path):
 
 def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkeypatch):
     # The reported error is that of a missing scale.
-    monkeypatch.setattr("viewer.exporters.rig.scaled", lambda figure, factor: figure)
+    monkeypatch.setattr("viewer.exporters.rig.placed", lambda figure, matrix: figure)
     actor = seamed_actor()
     actor.pose.figure_scale = 1.5
     _, notes = there_and_back(actor, tmp_path)

@@ -30,14 +30,16 @@ from viewer.phrases import Shown, agree, counted, listed
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rigs.geometry.transform import affine_matrices
 from viewer.rigs.hierarchy import depth_first
 from viewer.rigs.kinematics import joint_worlds, world_matrices
 from viewer.rigs.mesh import without_seams
 from viewer.rigs.motion.evaluation import still_frames
+from viewer.rigs.placed_figure import placed
 from viewer.rigs.pose import Pose, joint_offsets, rest_pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import shaped
-from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label, scaled_skeleton
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
 from viewer.rigs.skin import skin_rows
 from viewer.rigs.skinning import Skinning, deform, joint_matrices, skin_used
 
@@ -108,7 +110,9 @@ def _is_picture(name: str) -> bool:
 def _as_rig(actor: Actor, skinning: Skinning) -> tuple[_CourseSkeleton, Figure, np.ndarray | None]:
     """Return the figure in the form of the files, and the original vertex of each split vertex."""
     pose = actor.pose
-    figure = scaled(shaped(actor.figure, pose.shape_weights), pose.figure_scale)
+    figure = replace(shaped(actor.figure, pose.shape_weights), blend_shapes=None)
+    if pose.figure_scale != 1.0:
+        figure = placed(figure, affine_matrices(pose.figure_scale * np.eye(3), np.zeros(3)))
     skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
     course = course_skeleton(skeleton, pose)
     posed, order = course.skeleton, course.order
@@ -190,22 +194,6 @@ def _changed(actor: Actor, course: _CourseSkeleton) -> list[Diagnostic]:
             )
         )
     return notes
-
-
-def scaled(figure: Figure, factor: float) -> Figure:
-    """Return a figure with mesh, joints and bindings scaled about its origin."""
-    if factor == 1.0:
-        return figure
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    if mesh is not None:
-        mesh = replace(mesh, positions=mesh.positions * factor)
-    if skeleton is not None:
-        skeleton = scaled_skeleton(skeleton, factor)
-    if skin is not None:
-        inverse_bind = skin.inverse_bind.copy()
-        inverse_bind[:, :3, 3] *= factor
-        skin = replace(skin, inverse_bind=inverse_bind)
-    return replace(figure, mesh=mesh, skeleton=skeleton, skin=skin, blend_shapes=None)
 
 
 def _lost(figure: Figure) -> list[Diagnostic]:

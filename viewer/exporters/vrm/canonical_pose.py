@@ -10,16 +10,16 @@ import numpy as np
 from viewer.rigs.arrays import Floats
 from viewer.rigs.blendshapes import BlendShapes
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.quaternion import between, multiply
+from viewer.rigs.geometry.quaternion import between
 from viewer.rigs.geometry.rotation import (
     matrix_to_quaternion,
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import axes_along, axis_vector, unit
 from viewer.rigs.humanoid import Humanoid
 from viewer.rigs.kinematics import joint_worlds, world_matrices
+from viewer.rigs.placed_figure import placed
 from viewer.rigs.pose import Pose, joint_rotations, local_matrices, rest_pose
 from viewer.rigs.shape import shaped
 from viewer.rigs.skeleton import Skeleton
@@ -51,7 +51,7 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
         heights = points @ up
         low = float(heights.min())
         matrix[1, 3] = -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
-    return _transformed(figure, shapes, pose, local, matrix, scale, bones)
+    return _transformed(figure, shapes, pose, local, matrix, bones)
 
 
 def facing_front(figure: Figure, bones: Mapping[str, int]) -> Figure:
@@ -60,7 +60,7 @@ def facing_front(figure: Figure, bones: Mapping[str, int]) -> Figure:
     pose = rest_pose(skeleton)
     matrix = np.diag([-1.0, 1.0, -1.0, 1.0])
     local = local_matrices(skeleton, pose)
-    return _transformed(figure, figure.blend_shapes, pose, local, matrix, 1.0, bones)
+    return _transformed(figure, figure.blend_shapes, pose, local, matrix, bones)
 
 
 def _transformed(
@@ -69,21 +69,15 @@ def _transformed(
     pose: Pose,
     local: Floats,
     matrix: Floats,
-    scale: float,
     bones: Mapping[str, int],
 ) -> Figure:
-    """Return a figure whose roots, mesh and bindings are moved by (4, 4), without DOFs."""
-    skeleton, turn = figure.require_skeleton(), matrix[:3, :3] / scale
-    roots = skeleton.parents < 0
-    places = scale * local[:, :3, 3]
-    places[roots] = apply_transform(matrix, local[roots, :3, 3])
-    rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
-    rotations[roots] = multiply(matrix_to_quaternion(turn), rotations[roots])
+    """Return a figure in a pose of its joints, moved by (4, 4), without DOFs."""
+    skeleton = figure.require_skeleton()
     plain = Skeleton(
         names=skeleton.names,
         parents=skeleton.parents,
-        rest_translations=places,
-        rest_rotations=rotations,
+        rest_translations=local[:, :3, 3],
+        rest_rotations=matrix_to_quaternion(joint_rotations(skeleton, pose)),
         rest_scales=pose.scales,
         dof_joints=np.zeros(0, np.int32),
         dof_kinds=np.zeros(0, np.int32),
@@ -93,17 +87,12 @@ def _transformed(
         humanoid=Humanoid(dict(bones)),
         constraints=skeleton.constraints,
     )
-    moved = replace(
+    posed = replace(
         figure, skeleton=plain, up="y", unit="m", correctives=None, joint_regressor=None, hands=(),
         pose_layout=None, body_parts=None, keypoints=None, reduced=None, symmetry=None, fields=(),
-        blend_shapes=None, animations=(),
+        blend_shapes=shapes, animations=(),
     )  # fmt: skip
-    moved = _moved_mesh(moved, matrix, scale)
-    if shapes is None:
-        return moved
-    normals = None if shapes.normal_offsets is None else shapes.normal_values() @ turn.T
-    offsets = shapes.direction_values() @ (scale * turn).T
-    return replace(moved, blend_shapes=replace(shapes, offsets=offsets, normal_offsets=normals))
+    return placed(posed, matrix)
 
 
 def vrm_axes(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Floats:
@@ -120,22 +109,6 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     if not left.any():
         left = np.array([1.0, 0.0, 0.0])
     return axes_along(up, left).T
-
-
-def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
-    """Return a figure with its mesh and bindings transformed as its joints already are."""
-    mesh, skin = figure.mesh, figure.skin
-    if mesh is None:
-        return figure
-    turned = replace(
-        mesh,
-        positions=apply_transform(matrix, mesh.positions),
-        normals=mesh.normals @ (matrix[:3, :3] / scale).T,
-    )
-    if skin is None:
-        return replace(figure, mesh=turned)
-    bound = np.diag([scale, scale, scale, 1.0]) @ skin.inverse_bind @ np.linalg.inv(matrix)
-    return replace(figure, mesh=turned, skin=replace(skin, inverse_bind=bound))
 
 
 def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
