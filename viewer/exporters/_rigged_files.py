@@ -15,12 +15,11 @@ from viewer.exporters._losses.pose_errors import PoseLosses
 from viewer.exporters.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import Remedy, counted
-from viewer.rigs.arrays import Arrays, Floats
+from viewer.rigs.arrays import Arrays
 from viewer.rigs.figure import Figure, figure_pose
-from viewer.rigs.geometry.transform import apply_transform
-from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.mesh import vertex_normals
-from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.placed_figure import bound_in
+from viewer.rigs.pose import Pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.shape import pose_weights
 from viewer.rigs.skin import influence_counts, limit_influences
@@ -72,22 +71,18 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:
-        target = deform(figure, rigged.pose)[0]
-        key = (
-            "X003.rigged-vrm-pose: the figure is in the template's rest pose, at the origin: .npz "
-            "and .skel also store the pose of the mesh"
-        )
-        if output.suffix.lower() != ".vrm":  # whose exporter puts figures on the ground itself
-            figure = _standing(figure, target, rigged.pose)
-            key = (
-                "X003.rigged-pose: the figure is in the template's rest pose, on the ground of the "
-                "mesh: .npz and .skel also store the pose of the mesh"
-            )
-        moved = np.abs(deform(figure)[0] - target).max()
+        is_vrm = output.suffix.lower() == ".vrm"
+        if not is_vrm:
+            figure = bound_in(figure, rigged.pose)
         figure, limited = _limited(figure, rigged.max_influences)
         notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
-        if moved > _SAME * np.ptp(target, axis=0).max():
-            notes.append(Diagnostic(key))
+        if is_vrm and _is_moved(figure, rigged.pose):
+            notes.append(
+                Diagnostic(
+                    "X003.rigged-vrm-pose: the figure is in the template's rest pose, at the "
+                    "origin: .npz, .skel, .glb and .gltf show it as the mesh is"
+                )
+            )
         notes += limited
         if rigged.figure.correctives is not None:
             notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
@@ -105,29 +100,11 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     return notes
 
 
-def _standing(figure: Figure, target: Floats, pose: Pose) -> Figure:
-    """Return a figure without correctives that at rest stands where the mesh (V, 3) in a pose does.
-
-    The root of a template may be at the origin, and its feet far below the ground. Joints, bindings
-    and mesh move together, so that every program shows the figure beside the mesh it was made of.
-    """
-    skeleton, skin, mesh = figure.require_skeleton(), figure.require_skin(), figure.require_mesh()
-    rest, up = figure_pose(figure), axis_vector(figure.up)
-    rest.figure_scale, rest.figure_translation = pose.figure_scale, pose.figure_translation
-    # The placement T(t) S(s), which follows skinning, moves to the roots: P M B v = (P M) (B P^-1)
-    # (P v).
-    place = placement_matrix(rest)
-    place[:3, 3] += ((target @ up).min() - (deform(figure, rest)[0] @ up).min()) * up
-    roots = skeleton.parents < 0
-    translations, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
-    translations[roots] = apply_transform(place, translations[roots])
-    scales[roots] *= rest.figure_scale
-    return replace(
-        figure,
-        mesh=replace(mesh, positions=apply_transform(place, mesh.positions)),
-        skeleton=replace(skeleton, rest_translations=translations, rest_scales=scales),
-        skin=replace(skin, inverse_bind=skin.inverse_bind @ np.linalg.inv(place)),
-    )
+def _is_moved(figure: Figure, pose: Pose) -> bool:
+    """Return whether a figure without correctives is elsewhere in a pose than at rest."""
+    target = deform(figure, pose)[0]
+    moved = np.abs(deform(figure)[0] - target).max()
+    return bool(moved > _SAME * np.ptp(target, axis=0).max())
 
 
 def _limited(figure: Figure, requested: int | None) -> tuple[Figure, list[Diagnostic]]:
