@@ -370,12 +370,27 @@ def test_check_of_a_plugin_is_run_and_listed(install, tmp_path, monkeypatch, cap
     ],
     ids=["taken", "exception", "result", "value"],
 )
-def test_error_of_a_check_names_its_package(code, body, message, install, tmp_path, monkeypatch):
+def test_error_of_a_check_names_its_package_and_stops_no_other(
+    code, body, message, install, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     install_check(install, "names", code, body)
-    with pytest.raises(PluginError) as problem:
-        viewer.lint("fox.obj")
-    assert str(problem.value).startswith(f"plug-in names 0.1 (checks names): {message}")
+    Path("fox.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 1 2 2\n")
+    own = viewer.lint("fox.obj")
+    (failed,) = [row for row in own.to_dicts() if row["code"] == "P000"]
+    assert failed["message"].startswith(f"plug-in names 0.1 (checks names): {message}")
+    assert failed["severity"] == "error"
+    with without_plugins():
+        alone = viewer.lint("fox.obj").to_dicts()
+    assert alone and [row for row in own.to_dicts() if row != failed] == alone
+    # Two figures, one line for the plug-in.
+    Path("hen.obj").write_text(Path("fox.obj").read_text())
+    assert run(["lint", "fox.obj", "hen.obj"]) == 1
+    assert capsys.readouterr().out.count("P000") == 1
+    assert (
+        run(["lint", "fox.obj", "--ignore", "P000,M001,M002,M003,M004,M005", "--fail-on", "error"])
+        == 0
+    )
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from viewer.linting import (
     lint_files,
     recheck,
     summary,
+    used_checks,
     worst_first,
 )
 from viewer.near_names import did_you_mean
@@ -84,6 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
             for name, code in known_codes().items()
         ]
         print("\n".join(table_lines(rows)))
+        for problem in used_checks()[1]:
+            raise problem
         return 0
     require_files(arguments.files, arguments.body, "lint")
     found = _checked(arguments)

@@ -285,6 +285,12 @@ CODES: dict[str, Code] = {
             "specify --up, --facing or --landmarks, or use another template",
         ),
     ),
+    # Plug-ins; other codes with "P" are those of their checks.
+    "P000": Code(
+        "error",
+        "failed check of a plug-in",
+        Remedy("update or uninstall the plug-in", "update the plug-in, or use --no-plugins"),
+    ),
     # Comparison
     "D001": Code(
         "warning", "part without a counterpart", "compare files of the same figure and motion"

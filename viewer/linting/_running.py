@@ -10,8 +10,8 @@ from importlib import import_module
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import CODES, SEVERITIES, Code
-from viewer.errors import FormatError
+from viewer.diagnostics import CODES, SEVERITIES, Code, Diagnostic
+from viewer.errors import FormatError, PluginError
 from viewer.linting._finding import Finding, LintOptions
 from viewer.linting._subject import Subject, counting_of
 from viewer.phrases import listed
@@ -66,12 +66,15 @@ The module of a plug-in also has ``CODES``, a dict of ``viewer.diagnostics.Code`
 more capitals or digits. ``CHECK`` is its row, if the check depends on motions."""
 
 
-def used_checks() -> dict[str, Check]:
-    """Return all rows, with those of plug-ins, whose codes are then known."""
-    found = dict(CHECKS)
+def used_checks() -> tuple[dict[str, Check], list[PluginError]]:
+    """Return all rows, with those of plug-ins, whose codes are then known, and failed plug-ins."""
+    found, failed = dict(CHECKS), list[PluginError]()
     for plugin in added_to("checks", CHECKS):
-        found[plugin.name] = plugged_check(plugin)
-    return found
+        try:
+            found[plugin.name] = plugged_check(plugin)
+        except PluginError as problem:
+            failed.append(problem)
+    return found, failed
 
 
 def plugged_check(plugin: Plugin) -> Check:
@@ -115,7 +118,10 @@ def lint_scene(
     options: LintOptions | None = None,
     invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
-    """Run all checks on an open scene, by actor, in order; ``invalid`` as for ``Subject``."""
+    """Run all checks on an open scene, by actor, in order; ``invalid`` as for ``Subject``.
+
+    A plug-in that fails is a finding, and all other checks are run.
+    """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
     counting = counting_of(scene, chosen.frame_rate or rate)
@@ -126,18 +132,29 @@ def lint_scene(
         subjects.append(Subject(actor, index, scene.up, chosen, counting, lost, people))
     # The key rate of the animation that plays does not apply to the frames of others.
     others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
-    checks = used_checks()
+    checks, failed = used_checks()
     checked = _checked(subjects, others, checks)
     steps = [(subject, name) for subject, names in checked for name in names]
-    findings: list[Finding] = []
+    findings = [_failure(problem) for problem in failed]
+    stopped: set[str] = set()
     for number, (subject, name) in enumerate(steps):
         report(number, len(steps), what=f"{subject.actor.name}: {checks[name].title}")
         # Products of huge numbers overflow; vertices that far away are reported as strays.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            findings += _findings(name, subject)
+            try:
+                findings += [] if name in stopped else _findings(name, subject)
+            except PluginError as problem:
+                findings.append(_failure(problem))
+                stopped.add(name)
         if number + 1 == len(steps) or steps[number + 1][0] is not subject:
             subject.tracks.clear()  # a long track uses much memory, and is not needed again
     return _together(findings)
+
+
+def _failure(problem: PluginError) -> Finding:
+    """Return the finding that a plug-in failed."""
+    what = {"problem": str(problem)}
+    return Finding(Diagnostic("P000.failed: {problem}; its check is left out", values=what))
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
