@@ -138,6 +138,7 @@ def test_word_unlike_any_command_is_treated_as_a_file(capsys, tmp_path, monkeypa
         (["lint", "--jsn"], "--jsn", "--json"),
         (["info", "--metod", "x"], "--metod", "--method"),
         (["--ply"], "--ply", "--play"),
+        (["render", "--skeleton"], "--skeleton", "--show skeleton?"),
         (["doctor", "--hlp"], "--hlp", "--help"),
     ],
 )

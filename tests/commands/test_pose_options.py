@@ -307,3 +307,14 @@ def test_pose_file_with_a_list_is_refused_as_a_pose(folder, capsys, text, found)
     assert message.startswith(
         "list.json:1: expected a pose (an object with named values), found " + found
     )
+
+
+@pytest.mark.parametrize(
+    ("files", "warnings"),
+    [
+        ("arms.skel", ["warning: --method: no figure has a skin, so it has no effect"]),
+        ("twist.skel twist.skin", []),
+    ],
+)
+def test_method_without_a_skin_is_a_warning(folder, capsys, files, warnings):
+    assert described(capsys, *files.split(), "--method", "dqs")[1] == warnings

@@ -79,13 +79,20 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser.add_argument_group("skinning"), Skinning)
 
 
-def use_file_method(scene: Scene, skinning: Skinning, given: Collection[str]) -> None:
-    """Set the method that the files of a scene ask for, unless ``given`` has it or its factor."""
+def use_file_method(scene: Scene, skinning: Skinning, given: Collection[str]) -> list[str]:
+    """Set the method that the files of a scene ask for, unless ``given`` has it or its factor.
+
+    Returns a message if an option is given, but no figure has a skin.
+    """
     method, factor = file_method(actor.figure for actor in scene.actors)
     if "method" not in given:
         skinning.method = method
     if "blend_factor" not in given and skinning.method == method:
         skinning.blend_factor = factor
+    if not given or any(actor.figure.skin is not None for actor in scene.actors):
+        return []
+    option = "--method" if "method" in given else "--blend-factor"
+    return [f"{option}: no figure has a skin, so it has no effect"]
 
 
 def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Diagnostic]:

@@ -72,7 +72,14 @@ class Parser(argparse.ArgumentParser):
                 continue
             # Leading dashes would make all options similar.
             bare = {option.lstrip("-"): option for option in known}
-            near = question([bare[one] for one in near_names(name.lstrip("-"), bare)])
+            near = question(
+                [bare[one] for one in near_names(name.lstrip("-"), bare)]
+                or [
+                    f"{option} {name.lstrip('-')}"
+                    for option, action in known.items()
+                    if action.choices is not None and name.lstrip("-") in action.choices
+                ]
+            )
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> object:

@@ -156,7 +156,7 @@ def run(arguments: argparse.Namespace) -> int:
     notes = convert_streamed(asked, options, output) if is_plain else None
     if notes is None:
         scene = open_scene(asked)
-        use_file_method(scene, skinning, stated(Skinning, arguments))
+        print_warnings(use_file_method(scene, skinning, stated(Skinning, arguments)))
         fixed = [] if fixes_nothing else _fixed(scene, arguments.fix)
         baked = _bake_springs(asked.motion.springs, asked.frames.fps, scene, output)
         saving = _saving_joint_map(joint_map, asked, scene, output, arguments.force)
@@ -204,6 +204,12 @@ def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
     return [*found.notes, *read, *left]
 
 
+def check_format(output: Path) -> None:
+    """Raise for a suffix that nothing writes."""
+    if not exporters_at(output):
+        raise no_exporter(output)
+
+
 def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:
     """Check the output before anything is read."""
     asked.frames.check()
@@ -214,9 +220,8 @@ def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, for
             f"{name}: expected a suffix, which selects the format; use a link to {name} that has "
             f"one"
         )
+    check_format(output)
     suffix, kinds = output.suffix.lower() or FOLDER, exporters_at(output)
-    if not kinds:
-        raise no_exporter(output)
     if options.optimizes and not any("optimizes" in kind.options for kind in kinds):
         raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
     if options.page != PageOptions() and not any("page" in kind.options for kind in kinds):

@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.commands._pose import add_skinning_arguments, use_file_method
-from viewer.commands._scene import add_scene_arguments, open_scene, scene_options
+from viewer.commands._scene import (
+    add_scene_arguments,
+    open_scene,
+    print_warnings,
+    scene_options,
+)
 from viewer.commands._settings import settings_of, stated
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
@@ -60,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_files(arguments.files, arguments.body, "info")
     skinning = settings_of(Skinning, arguments)
     scene = open_scene(scene_options(arguments))
-    use_file_method(scene, skinning, stated(Skinning, arguments))
+    print_warnings(use_file_method(scene, skinning, stated(Skinning, arguments)))
     found = describe(scene, skinning)
     note_values(found)
     if arguments.json:

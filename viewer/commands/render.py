@@ -161,7 +161,7 @@ def run(arguments: argparse.Namespace) -> int:
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(asked)
-    use_file_method(scene, options.skinning, stated(Skinning, arguments))
+    print_warnings(use_file_method(scene, options.skinning, stated(Skinning, arguments)))
     print_warnings(look_through_video(view, asked.motion, scene))
     if arguments.overlay is not None:
         if scene.images is None:
@@ -243,6 +243,13 @@ def _check_suffix(asked: SceneOptions, output: Path) -> None:
     if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
         # Overwriting an input is worse, so it is reported first.
         check_targets([output], inputs_of(asked), force=True)
+        check_format(output)
+
+
+def check_format(output: Path) -> None:
+    """Raise for a suffix of neither an image nor a video."""
+    suffix = output.suffix.lower()
+    if suffix not in ("", *PICTURES, *VIDEOS):
         raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) or a video "
             f"({', '.join(VIDEOS)}), found {suffix}"

@@ -233,6 +233,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def check_format(output: Path) -> None:
+    """Raise for a suffix that stores no rigged mesh."""
+    from viewer.exporters._rigged_files import files_of
+
+    files_of(output)
+
+
 def rig(
     target: Scene | Actor | str | Path | Sequence[str | Path],
     template: str | Path | Sequence[str | Path] | None = None,

@@ -192,7 +192,7 @@ def _start(
             finish(builder, scene)  # determines who is present at that time
     clean(scene, asked.changes)
     print_warnings(apply_pose(scene, asked.pose, asked.frames))
-    use_file_method(scene, options.skinning, given)
+    print_warnings(use_file_method(scene, options.skinning, given))
     print_warnings(look_through_video(view, asked.motion, scene))
     hide_parts(view, scene, options)
     print_warnings(warn_of_missing(scene, options) + follow_notes(view, scene))

@@ -15,7 +15,7 @@ from viewer.exporters._exporter import FOLDER, Content, Exporter, Part, SampledP
 from viewer.exporters._left_out import motion_notes
 from viewer.exporters._motion_paths import files_at, is_together, part_files, part_paths
 from viewer.exporters._options import ExportOptions, PageOptions, VrmMeta
-from viewer.formats import all_or_none
+from viewer.formats import FORMATS, all_or_none
 from viewer.interrupts import raising
 from viewer.media.image import PICTURES
 from viewer.media.video_kinds import VIDEOS
@@ -266,7 +266,9 @@ def no_exporter(path: str | Path) -> UnsupportedFormatError:
     suffix = Path(path).suffix.lower() or FOLDER
     if suffix in (*PICTURES, *VIDEOS):
         known += "; viewer render draws pictures and videos, as do viewer.render and viewer.video"
-    return UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
+    read = any(suffix in each.suffixes for each in FORMATS.values())
+    only = ", which is only read; .glb holds figures and motions" if read else ""
+    return UnsupportedFormatError(f'no exporter for "{suffix}"{only}; supported: {known}')
 
 
 def known_suffixes(kinds: Iterable[Exporter] = EXPORTERS.values()) -> str:

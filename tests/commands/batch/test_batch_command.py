@@ -248,6 +248,10 @@ def test_python_refuses_limits_below_zero(rigs, wrong):
         (["convert", "in"], "expected -o OUT"),
         (["convert", "-o", "out", "--to", "obj"], "found none"),
         (["convert", "in", "-o", "out"], "--to SUFFIX"),
+        (["convert", "in", "-o", "out", "--to", "zzz"], 'no exporter for ".zzz"; supported: .obj'),
+        (["convert", "in", "-o", "{stem}.zzz"], 'no exporter for ".zzz"; supported: .obj'),
+        (["render", "in", "-o", "out", "--to", "zzz"], "{stem}.zzz: expected an image (.png"),
+        (["rig", "in", "-o", "out", "--to", "obj"], 'cannot be written as ".obj"; supported'),
         (
             ["convert", "in", "-o", "all.obj", "--to", "obj", "--with", "no.skin"],
             "no.skin: no such",

@@ -353,7 +353,13 @@ def test_actor_that_cannot_be_written_reverts_all_files(tmp_path, capsys, monkey
 @pytest.mark.parametrize(
     ("out", "code", "message"),
     [
-        ("x.fbx", 2, f'no exporter for ".fbx"; supported: {SUFFIXES}'),
+        (
+            "x.fbx",
+            2,
+            'no exporter for ".fbx", which is only read; .glb holds figures and motions; '
+            f"supported: {SUFFIXES}",
+        ),
+        ("x.xyz", 2, f'no exporter for ".xyz"; supported: {SUFFIXES}'),
         ("x", 2, NO_MEMBER),
         ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder {folder}/missing does not exist"),
         (

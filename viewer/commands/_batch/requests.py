@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from viewer.batching.engines import Job
 from viewer.batching.execution import attempt
 from viewer.batching.inputs import is_recording
 from viewer.batching.items import Item, Result
+from viewer.batching.naming import template_of
 from viewer.batching.submissions import (
     Submission,
     find_submissions,
@@ -94,6 +96,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         overview=name_in_shard(arguments.overview, arguments.shard),
         joint_map=getattr(arguments, "save_joint_map", None) or "",
     )
+    _check_format(name, request)
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)
     job: Job = CommandJob(name, options, tuple(fixed), tuple(request.shared))
@@ -101,6 +104,17 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         alike = patterns_of(input_files(options["reference"]))
         job = _SubmissionJob(job, tuple(arguments.expect), tuple(alike), _temporary_folder())
     return request, job
+
+
+def _check_format(job: str, request: Request) -> None:
+    """Raise for a suffix that the job does not write, rather than for each item."""
+    if not request.output:
+        return
+    template = Path(template_of(request.output, request.to))
+    command = import_module(f"viewer.commands.{job}")
+    # A suffix with a field of the template is known for each item only.
+    if "{" not in template.suffix and hasattr(command, "check_format"):
+        command.check_format(template)
 
 
 def _inputs(job: str, files: list[str]) -> tuple[list[str], list[str]]:
