@@ -19,7 +19,6 @@ from rigs.retargeting.walking import RATE, walk
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.exporters import ExportOptions
-from viewer.exporters.rig import scaled
 from viewer.formats.rigged import save
 from viewer.loading import Contents, MotionSettings, begin, bundled_body, load
 from viewer.loading.cleaning import clean_up
@@ -32,6 +31,7 @@ from viewer.rigs.geometry.transform import rotation_transform
 from viewer.rigs.motion.clip import Clip
 from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.placed_figure import placed
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.scene import Actor, Scene, scene_unit
@@ -315,10 +315,11 @@ def test_scaled_figures_stand_side_by_side():
 
 def test_later_people_and_cameras_of_a_capture_are_scaled(tmp_path):
     known = load(bundled_body()).actors[0].figure
-    skeleton = scaled(known, 100.0).skeleton
+    longer = placed(known, np.diag([100.0, 100.0, 100.0, 1.0]))
+    skeleton = longer.skeleton
     names = ("Hips", *skeleton.names[1:])  # another name, so that the capture drives the figure
     save(
-        replace(scaled(known, 100.0), unit="cm", skeleton=replace(skeleton, names=names)),
+        replace(longer, unit="cm", skeleton=replace(skeleton, names=names)),
         tmp_path / "large.npz",
     )
     folder = tmp_path / "capture"
