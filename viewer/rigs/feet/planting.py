@@ -171,6 +171,9 @@ class PlantedFeet:
     where the whole body drifts."""
     raised: float = 0.0
     """Height by which the whole motion was raised because its feet never stand."""
+    ground: float = 0.0
+    """Height of the ground on which the feet stand, the nearest to 0 of all; without contacts, of
+    the lowest soles."""
 
     @property
     def is_better(self) -> bool:
@@ -225,7 +228,9 @@ def plant(
         roots = body.chains.joints[body.chains.parents < 0]
         lift = np.tile(raised * up, (clip.n_rows, 1))
         moved = _translated(clip, lift, roots) if raised else clip
-        return moved, PlantedFeet(n_glides=plan.n_glides, raised=raised, size=body.size)
+        soles = body.heights(worlds, up).min(axis=1)
+        low = float(np.percentile(soles, _LOWEST_ROWS)) + raised
+        return moved, PlantedFeet(n_glides=plan.n_glides, raised=raised, size=body.size, ground=low)
     best = _attempt(clip, body, worlds, plan, speed, 2)
     for number, ease in enumerate(_EASES, 1):
         # The knees of a noisy capture move suddenly before anything is changed.
@@ -283,6 +288,7 @@ def _attempt(
         body.size,
         ground_speed,
         plan.n_glides,
+        ground=min((height for each in plan.grounds for height in each), key=abs),
     )
     knees = (
         _knee_accelerations(each, body.legs, plan.spans, plan.rate) for each in (worlds, after)

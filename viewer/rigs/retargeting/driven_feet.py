@@ -32,6 +32,9 @@ _STANDING = 5.0
 # Height of a ground above which it is no ground at height 0, if the soles are not known, relative
 # to the body: ankles of chibis are as high as half of their legs, a quarter of this size.
 _LOW_GROUND = 0.2
+# Distance of the ground from height 0 that is said, as a fraction of the body's height: a motion
+# whose origin is the hip is half of it below, wrong heights of ankles or shoes are 5 % of it.
+_FAR = 0.1
 _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
@@ -159,6 +162,15 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
     if changes is None:
         return []
     called = {"motion": found.source.figure.name, "figure": figure.name}
+    is_far = abs(changes.ground) > _FAR * changes.size
+    far = note(
+        "F007.feet-far: feet of {figure} stand {length} {below} height 0, as those of {motion} "
+        "do{remedy}",
+        **called,
+        length=length_text(figure, abs(changes.ground)),
+        below="below" if changes.ground < 0.0 else "above",
+        remedy=Remedy("", ": --ground moves them there"),
+    )
     if not changes.is_better:
         key = (
             "F007.feet-kept: feet of {figure} not planted: they already slide as little as "
@@ -179,7 +191,7 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
                     remedy=Remedy("Feet on the ground in the Actors panel", "--feet off"),
                 )
             )
-        return notes
+        return [*notes, far] if is_far else notes
 
     def text(length: float) -> str:
         return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
@@ -220,4 +232,4 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
             figure=figure.name,
             speed=f"{text(changes.ground_speed)}/s",
         )
-    return notes
+    return [*notes, far] if is_far else notes
