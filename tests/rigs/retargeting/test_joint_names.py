@@ -220,3 +220,30 @@ def test_sides_have_french_spanish_and_italian_words(names):
     left_name, right_name = names
     assert other_side(right_name) == left_name
     assert other_side(left_name) in (right_name, right_name + "e")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        *(("Bras_G", "Bras_D"), ("PiedG", "PiedD"), ("g_coude", "d_coude")),
+        *(("pierna_i", "pierna_d"), ("Gamba.S", "Gamba.D"), ("coxa_e", "coxa_d")),
+        *(("pouce1_G", "pouce1_D"), ("Mignolo.S", "Mignolo.D"), ("Arm_L", "Arm_R")),
+    ],
+)
+def test_other_side_has_the_initial_of_the_language(names):
+    left_name, right_name = names
+    assert other_side(left_name) == right_name
+    assert other_side(right_name) == left_name
+
+
+def test_main_is_a_hand_only_among_french_words():
+    parents = np.array([-1, 0, 1, 2])
+    french = ["bassin", "bras_l", "avantbras_l", "main_l"]
+    assert canonical_names(french, parents)[3] == "left_wrist"
+    # A control beside the arm: the hand keeps its name.
+    english = ["hips", "main_l", "upperarm_l", "lowerarm_l", "hand_l"]
+    found = canonical_names(english, np.array([-1, 0, 0, 2, 3]))
+    assert found == ("pelvis", "", "left_shoulder", "left_elbow", "left_wrist")
+    # Without a hand, it is none either.
+    found = canonical_names(english[:4], np.array([-1, 0, 0, 2]))
+    assert found == ("pelvis", "", "left_shoulder", "left_elbow")

@@ -120,12 +120,19 @@ _EYES = {"eye", "eyesmplhf", "eyeball", "adjfaceeye", "目"}
 _XSENS_SPINE = {"l5", "l3", "t12", "t8"}
 _CHAINS = ("spine", "neck")
 
+# Words for thumb, index, middle, ring and little finger.
+_FINGERS_IN = {
+    "French": "pouce index majeur annulaire auriculaire",
+    "Spanish": "pulgar índice/indice medio anular meñique/menique",
+    "Italian": "pollice indice medio anulare mignolo",
+    "Portuguese": "polegar indicador medio anelar mindinho",
+}
+_NUMBERED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _ROMANCE_FINGERS = {
-    **{"pouce": "thumb", "index": "index", "majeur": "middle", "annulaire": "ring"},
-    **{"auriculaire": "pinky", "pulgar": "thumb", "índice": "index", "indice": "index"},
-    **{"medio": "middle", "anular": "ring", "meñique": "pinky", "menique": "pinky"},
-    **{"pollice": "thumb", "anulare": "ring", "mignolo": "pinky"},
-    **{"polegar": "thumb", "indicador": "index", "anelar": "ring", "mindinho": "pinky"},
+    word: finger
+    for row in _FINGERS_IN.values()
+    for finger, words in zip(_NUMBERED_FINGERS, row.split(), strict=True)
+    for word in words.split("/")
 }
 _FINGERS = {
     **{name: name for name in ("thumb", "index", "middle", "ring", "pinky")},
@@ -144,7 +151,6 @@ _PHALANX = {"metacarpal": 0, "proximal": 1, "intermediate": 2, "medial": 2, "dis
 _FINGER = re.compile(
     rf"(?:hand|finger|doigt|dedo|dito|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
 )
-_NUMBERED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _ROKOKO_FINGER = re.compile(rf"finger([1-5])({'|'.join(_PHALANX)})")
 _BIPED_FINGER = re.compile(r"finger([0-4])([12]?)")
 
@@ -159,8 +165,9 @@ _SIDES = {
     **dict.fromkeys(("esq", "esquerda", "esquerdo", "zuo"), "left"),
     **dict.fromkeys(("dir", "direita", "direito", "you"), "right"),
 }
-# Initials of these words, only behind or before a word of the same languages.
-_INITIALS = {"g": "left", "i": "left", "s": "left", "e": "left", "d": "right"}
+# Initials of these words, only behind or before a word of the same languages: left, and right.
+_INITIALS_IN = {"French": "gd", "Spanish": "id", "Italian": "sd", "Portuguese": "ed"}
+_INITIALS = {"d": "right", **{letters[0]: "left" for letters in _INITIALS_IN.values()}}
 _PAIRS = (
     *(("l", "r"), ("left", "right"), ("lft", "rgt"), ("lt", "rt"), ("hidari", "migi")),
     *(("links", "rechts"), ("gauche", "droit"), ("gauche", "droite"), ("izq", "der"), ("sx", "dx")),
@@ -209,11 +216,16 @@ _LIMBS = [
     (_meanings(_ARM, arm), _meanings(_LEG, leg))
     for arm, leg in (*_FAMILIES.values(), *_ROMANCE.values())
 ]
-_ROMANCE_WORDS = {
-    *(word for row in _ROMANCE.values() for cells in row for word in re.split("[ /]", cells)),
-    *_ROMANCE_FINGERS,
+_WORDS_IN = {
+    name: {word for cells in (*bones, *joints, fingers) for word in re.split("[ /]", cells)}
+    for name, fingers in _FINGERS_IN.items()
+    for bones, joints in [(_ROMANCE[name], _ROMANCE[f"{name}, joints"])]
 }
+_ROMANCE_WORDS = set.union(*_WORDS_IN.values()) - {"-"}
 _SIDED = {word for limbs in _LIMBS for limb in limbs for word in limb}
+# Words that mean something else in English: a joint called main_l is a hand only among other words
+# of its language.
+_FALSE_FRIENDS = {"main", "pie", "coxa"}
 _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "foot"} - {"foot"}
 
 
@@ -241,14 +253,26 @@ def other_side(name: str) -> str:
     spans = [found.span() for found in _TOKEN.finditer(name)] + ends
     for start, end in spans:
         old = name[max(start, 0) : end]
-        new = _OTHER_SIDES.get(old.lower(), "")
-        if not new:
-            continue
-        cased = new.upper() if old.isupper() else new.title() if old.istitle() else new
-        swapped = f"{name[:start]}{cased}{name[end:]}"
-        if _key(name_tokens(swapped)) == wanted:
-            return swapped
+        pair = _OTHER_SIDES.get(old.lower(), "")
+        for new in [pair] if pair else _other_initials(old.lower(), word):
+            cased = new.upper() if old.isupper() else new.title() if old.istitle() else new
+            swapped = f"{name[:start]}{cased}{name[end:]}"
+            if _key(name_tokens(swapped)) == wanted:
+                return swapped
     return ""
+
+
+def _other_initials(initial: str, word: str) -> list[str]:
+    """Return the initials of the other side, in the languages that have the word and the initial.
+
+    The right side has one initial in all of them, so the first language with the word counts.
+    """
+    stem = word.rstrip("0123456789")
+    return [
+        pair[1 - pair.index(initial)]
+        for name, pair in _INITIALS_IN.items()
+        if initial in (*pair,) and stem in _WORDS_IN[name]
+    ]
 
 
 @lru_cache(16)
@@ -459,6 +483,9 @@ def _word_of(key: _Key) -> str:
 
 def _limb_words(present: set[str]) -> tuple[dict[str, str], set[str]]:
     """Return what the sided words of a skeleton mean, and those of the families that decide it."""
+    for word in present & _FALSE_FRIENDS:
+        if all(present & words == {word} for words in _WORDS_IN.values() if word in words):
+            present = present - {word}
 
     def fit(words: Iterable[str]) -> int:
         return len(present.intersection(words))
