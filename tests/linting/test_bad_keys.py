@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linting.sound import FRAMES, RATE, legs, make_skeleton
 
-from viewer.linting import Finding, Subject, frozen, hinges, jitter, pops, stretch
+from viewer.linting import Finding, Subject, clips, frozen, hinges, jitter, pops, stretch
 from viewer.linting._subject import ends_of
 from viewer.rigs.figure import Figure
 from viewer.rigs.motion.sampled_clip import SampledClip
@@ -72,6 +72,14 @@ def pop_for_two(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> Non
     bends[30:32] += 50.0
 
 
+def pop_for_six(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends[30:36] += 20.0
+
+
+def pop_at_the_end(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends[FRAMES - 3] += 50.0
+
+
 def pop_in_a_twist(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     bends += 12.0 * K
     bends[30] += 24.0
@@ -125,11 +133,13 @@ def tremble(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
 FAULTS = {
     "pop of 50 degrees": (pop(50.0), "C020.rotation", [3], {"size": "50°"}, [30]),
     "pop of 15 degrees": (pop(-15.0), "C020.rotation", [3], {"size": "15°"}, [30]),
-    "pop of two frames": (pop_for_two, "C020.rotation", [3], {"size": "50°"}, [30]),
+    "pop of two frames": (pop_for_two, "C020.rotation", [3], {"size": "50°"}, [30, 31]),
+    "pop of six frames": (pop_for_six, "C020.rotation", [3], {"size": "20°"}, [*range(30, 36)]),
+    "pop at the end": (pop_at_the_end, "C020.rotation", [3], {"size": "50°"}, [57]),
     "pop of a fast joint": (pop_in_a_twist, "C020.rotation", [3], {"size": "24°"}, [30]),
     "pop of a quick limb": (pop_of_a_quick_limb(1), "C020.rotation", [3], {}, [30]),
     "pop of a quick limb for two frames": (
-        pop_of_a_quick_limb(2), "C020.rotation", [3], {}, [30]
+        pop_of_a_quick_limb(2), "C020.rotation", [3], {}, [30, 31]
     ),
     "spike": (spike, "C020.position", [0], {"size": "400 mm"}, [30]),
     "frozen": (freeze, "C021.frames", [], {"ranges": ["frames 27 to 38"]}, [*range(27, 39)]),
@@ -158,6 +168,21 @@ def test_fault_is_found_at_its_joint_and_frames(name, is_captured):
     for field, value in values.items():
         assert one.diagnostic.values.get(field, shown[field]) == value or shown[field] == value
     assert frames is None or sorted(one.frames.tolist()) == frames
+
+
+@pytest.mark.parametrize(("steps", "codes"), [((0, 0), ["C020.turn"]), ((12, 0), [])])
+def test_joint_that_turns_within_a_frame_is_found_unless_others_do(steps, codes):
+    """The elbow is 25 degrees off from frame 30 on, while spine, shoulder and wrist move."""
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    later = 1.0 * (K >= 30)
+    for joint, by in ((1, steps[0]), (2, steps[1]), (3, 25.0), (4, 0.0)):
+        turns[:, joint] = about_z(waving() + by * later)
+    clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 6, 3)))
+    found = [*pops.check(Subject(Actor(arm(), clip=clip)))]
+    assert [one.diagnostic.key for one in found] == codes
+    for one in found:
+        assert one.joints.tolist() == [3] and one.frames.tolist() == [30]
+        assert "rotates by 25° within frame 30" in one.message
 
 
 def nothing(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
@@ -243,8 +268,6 @@ def test_quick_swing_around_missing_frames_is_not_jitter(gap):
 
 def test_teleport_in_a_clip_of_keys_is_a_jump():
     """The pelvis of legs, below a root that stays, is 0.2 m aside from frame 30 on."""
-    from viewer.linting import clips
-
     figure = legs()
     rest = figure.skeleton.rest_translations[0]
     path = rest + np.where(K < 30, 0.0, 0.2)[:, None] * [1.0, 0.0, 0.0]
@@ -253,6 +276,18 @@ def test_teleport_in_a_clip_of_keys_is_a_jump():
     assert found.diagnostic.key == "C003.joint" and found.frames.tolist() == [30]
     # 0.2 m in 1/30 s; the limit is 5 times the size of 0.922 m per second.
     assert "pelvis moves at 6 m/s" in found.message and "limit 4.61 m/s" in found.message
+
+
+def test_body_that_shifts_within_a_frame_while_it_walks_is_found():
+    """The pelvis is 0.1 m aside from frame 30 on, at 1.4 m/s."""
+    figure = legs()
+    path = np.tile(figure.skeleton.rest_translations[0], (FRAMES, 1))
+    path += np.stack([0.1 * (K >= 30), 0.0 * K, 1.4 * K / RATE], axis=1)
+    channels = (TransformChannel(0, "translation", K / RATE, path),)
+    clip = TransformClip("x", channels, 0.0, 59 / RATE)
+    (found,) = clips.check(Subject(Actor(figure, clip=clip)))
+    assert found.diagnostic.key == "C003.step" and found.frames.tolist() == [30]
+    assert "pelvis shifts by 100 mm" in found.message
 
 
 def test_elbow_of_an_arm_without_a_wrist_is_checked():

@@ -20,6 +20,7 @@ from viewer.linting._subject import (
     track_of,
     travelling_joints,
 )
+from viewer.linting.pops import shifts
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.geometry.quaternion import angles_between
@@ -31,9 +32,7 @@ from viewer.rigs.skeleton import Skeleton, joint_labels
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
 _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
-# A body that shifts in one frame, and rests before and after, has not moved: falls accelerate.
-_STEP = 0.04  # minimum length, relative to the size: 70 mm for a person
-_STILL, _BESIDE = 0.1, 4  # maximum length of steps beside it, relative to it, and their number
+_BESIDE = 4  # number of steps before and after for which a pose is held
 _POSES = 3  # minimum number of changes between held poses that are a motion
 # A body that is displaced keeps its pose; one that takes another pose between two that are held is
 # blocked, even where the rest of the motion is not.
@@ -187,34 +186,23 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
 
 
 def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
-    """Report a body that shifts within a frame and hardly moves before and after."""
+    """Report a body that shifts within a frame, and moves on from there as before."""
     rows, carriers = track.on_frames(), travelling_joints(track, skeleton)
-    places = track.positions[rows][:, carriers]
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=2)
-    known = track.present[rows[1:]] & track.present[rows[:-1]]
-    around = [k for k in range(-_BESIDE, _BESIDE + 1) if k != 0]
-    is_step = (steps > _STEP * track.size) & (largest_around(steps, around) < _STILL * steps)
-    is_step &= known[:, None] & ~track.stepped[rows[1:]][:, carriers]
-    is_step[:_BESIDE] = is_step[max(len(steps) - _BESIDE, 0) :] = False
-    is_step[_poses(track, rows)] = False
-    frames, joints = np.nonzero(is_step)
-    if len(frames) == 0:
+    found = shifts(track, rows, carriers, ~_poses(track, rows))
+    if found is None:
         return
-    sizes = steps[frames, joints]
-    worst = int(sizes.argmax())
-    found = rows[frames + 1]
-    first, each = int(found[worst]), track.of_each(found)
+    first, each = int(found.frames[0][0]), track.of_each(np.concatenate(found.frames))
     yield subject.found(
-        "C003.step: {n}: {joint} shifts by {distance} at frame {frame}, {time:z.3f} s, at rest "
+        "C003.step: {n}: {joint} shifts by {distance} at frame {frame}, {time:z.3f} s, unlike "
         "before and after",
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,
-        joint=joint_labels(skeleton)[int(carriers[joints[worst]])],
-        distance=subject.length(float(sizes[worst]) / track.scale),
+        joint=joint_labels(skeleton)[int(found.columns[0])],
+        distance=subject.length(found.size / track.scale),
         frame=int(track.numbers[first]),
         time=float(track.times[first]),
         part="clip",
-        joints=np.unique(carriers[joints]),
+        joints=np.unique(found.columns),
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", first),

@@ -1,4 +1,4 @@
-"""Check of motions for pops: a joint that leaves its path for a frame or a few, and returns."""
+"""Check of motions for pops: a joint that leaves its path for a frame or a few, or stays off it."""
 
 from __future__ import annotations
 
@@ -10,35 +10,71 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject, Track, track_of, travelling_joints
-from viewer.linting.clips import largest_around
 from viewer.phrases import counted
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.inspection.faults import distinct
-from viewer.rigs.skeleton import Skeleton, joint_labels
+from viewer.rigs.skeleton import joint_labels
 
-# Frame f is off the path by d_f = x_f - (x_f-1 + x_f+1) / 2. A value that leaves a smooth path by a
-# for n frames, and returns, adds a pattern to it, and nothing around:
-_PATTERNS = {1: (-0.5, 1.0, -0.5), 2: (-0.5, 0.5, 0.5, -0.5)}
-# Of 120 clips of artists, blows and landings come near it, but with steps around that are half as
-# long, with d beside that is a quarter as large (for two frames, a fifth), or without returning.
-_SHAPE = 0.25  # maximum distance of d from the pattern, relative to the pattern's largest value
+# A value that leaves a smooth path by a for n frames, and returns, adds a box of height a to it,
+# and nothing around; one that stays off adds a step. Differences of the values leave little of a
+# smooth path, but all of the edges: of order 2, a single frame adds a (1, -2, 1), two frames add
+# a (1, -1, -1, 1), and a step adds a (1, -1). In quick motions of limbs, second differences are as
+# large as those of a pop, but fourth ones are smaller: of a swing of w radians a frame, they are
+# (2 - 2 cos w)^2, which is 0.07 for a period of 12 frames, while those of a pop reach 6.
+_LONGEST = 8  # maximum number of frames of a pop; longer ones are two steps
+# Of 120 clips of artists, blows and landings come near such a pattern, but with larger differences
+# beside it, with steps around that are half as long, without returning, or, if they end in a hold,
+# with unlike steps before and after.
+_SHAPE = 0.25  # maximum distance of differences from the pattern, relative to its largest value
 _RETURNS = 1.5  # minimum ratio of a to the distance between the frames before and after
-_STEPS, _OTHERS = 0.5, (4.0, 6.0)  # maximum step around, relative to a; minimum ratio to other d
-# A joint that is fast and steady pops by less than two of its steps, and meanwhile goes on.
-_FAST_STEPS, _FAST_OTHERS = 0.7, 10.0
-# In quick motions of limbs, d is as large as that of a pop. Their fourth differences are smaller:
-# of a swing of w radians a frame, they are (2 - 2 cos w)^2, which is 0.07 for a period of 12
-# frames, while those of a pop reach 6. Of the same clips, blows that end in a hold come near its
-# pattern, but the steps before and after it are unlike.
-_FOURTH = {1: (1.0, -4.0, 6.0, -4.0, 1.0), 2: (1.0, -3.0, 2.0, 2.0, -3.0, 1.0)}
-_QUICK_STEPS, _QUICK_OTHERS = 1.0, 6.0
 _ALIKE = 0.5  # minimum ratio of the steps before and after, unless both are much shorter than a
 _SHORT = 0.1  # length of such steps, relative to a
+# When one joint of a body snaps to another pose in earnest, so do some others: in the same clips,
+# their edges are at least 0.38 times as large. Keys that were shifted move one joint.
+_ALONE = 0.25  # maximum edge of another joint in the same frame, relative to a
+_GO_ON, _MOVES = 3, 1e-3  # minimum number of others that move meanwhile, by more than this angle
 _NEAR = 4  # number of steps before and after
-_AROUND = 8  # frames before and after that are compared
-_SEEN = 2  # of these, the minimum number on each side
+_AROUND = 8  # differences before and after that are compared
+_SEEN = 2  # minimum number of frames before and after
 _ANGLE = math.radians(6.0)  # smallest rotation that is seen as a pop
 _DISTANCE = 0.04  # the same of a travelling joint, relative to its size: 70 mm for a person
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A pop of some frames, or a step, as differences of one order show it."""
+
+    n_frames: int
+    """Frames off the path; 0 if the value stays there."""
+    order: int
+    others: float
+    """Minimum ratio of the pattern's largest value to the differences around it."""
+    steps: float
+    """Maximum length of the usual steps, relative to a."""
+    returns: bool = False
+    """Whether the path must go on near where it was left."""
+    alike: bool = False
+    """Whether the steps before and after must be alike."""
+
+    def pattern(self) -> Floats:
+        """Return the differences of a box or step of height 1 that are not 0: (P,)."""
+        outside = np.zeros(self.order)
+        box = np.ones(self.n_frames or self.order)
+        back = outside if self.n_frames else outside[:0]
+        return np.diff(np.concatenate([outside, box, back]), n=self.order)
+
+
+# A joint that is fast and steady pops by less than two of its steps, and meanwhile goes on.
+_POPS = tuple(
+    shape
+    for n in range(1, _LONGEST + 1)
+    for shape in (
+        _Shape(n, 2, 4.0 if n == 1 else 6.0, 0.5, returns=True),
+        _Shape(n, 2, 10.0, 0.7),
+        _Shape(n, 4, 6.0, 1.0, alike=True),
+    )
+)
+_STEPS = (_Shape(0, 2, 4.0, 0.5), _Shape(0, 3, 4.0, 0.5), _Shape(0, 4, 6.0, 1.0))
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -49,160 +85,194 @@ def check(subject: Subject) -> Iterator[Finding]:
     rows = track.on_frames()
     if len(rows) < 2 * _AROUND:
         return
+    known, joints = _known(track, rows), np.arange(skeleton.n_joints)
     # Close to each other, unit quaternions are half the angle of their rotation apart.
-    found = _pops(track, rows, 2.0 * track.turns(rows), np.arange(skeleton.n_joints), _ANGLE)
+    turns = 2.0 * track.turns(rows)
+    found = _found(turns, known, _POPS, _ANGLE)
     if found is not None:
         yield _finding(
             subject,
             track,
-            skeleton,
-            found,
+            found.of(rows, joints),
             "C020.rotation: {n}: {joint} rotates away by {size} at frame {frame}, {time:z.3f} s, "
             "and back",
             f"{math.degrees(found.size):.0f}°",
         )
-    carriers = travelling_joints(track, skeleton)
-    places = track.positions[rows][:, carriers]
-    found = _pops(track, rows, places, carriers, _DISTANCE * track.size)
+    found = _alone(_found(turns, known, _STEPS, _ANGLE), turns)
     if found is not None:
         yield _finding(
             subject,
             track,
-            skeleton,
-            found,
+            found.of(rows, joints),
+            "C020.turn: {n}: {joint} rotates by {size} within frame {frame}, {time:z.3f} s, while "
+            "the others go on",
+            f"{math.degrees(found.size):.0f}°",
+        )
+    carriers = travelling_joints(track, skeleton)
+    places = track.positions[rows][:, carriers]
+    found = _found(places, known[:, carriers], _POPS, _DISTANCE * track.size)
+    if found is not None:
+        yield _finding(
+            subject,
+            track,
+            found.of(rows, carriers),
             "C020.position: {n}: {joint} jumps away by {size} at frame {frame}, {time:z.3f} s, and "
             "back",
             subject.length(found.size / track.scale),
         )
 
 
+def shifts(track: Track, rows: Indices, joints: Ints, is_step: Bools) -> OffPath | None:
+    """Return where joints (N,) shift within a frame and stay there; ``is_step``: (F - 1,) allowed.
+
+    ``rows``: of the track, (F,).
+    """
+    known = _known(track, rows)[:, joints]
+    known[1:] &= is_step[:, None]
+    found = _found(track.positions[rows][:, joints], known, _STEPS, _DISTANCE * track.size)
+    return None if found is None else found.of(rows, joints)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class _Pops:
-    """Values that leave their path and return."""
+class OffPath:
+    """Pops or steps of joints, the largest first."""
 
-    size: float
-    """The largest distance from the path."""
-    rows: Indices
-    """(N,): rows of the first frames off the path, the largest distance first."""
-    joints: Indices
-    """(N,): their joints."""
+    sizes: Floats
+    """(P,): distances from the path."""
+    frames: tuple[Indices, ...]
+    """Of each, the frames off the path, or the first one that stays off it."""
+    columns: Indices
+    """(P,): their joints."""
+
+    @property
+    def size(self) -> float:
+        """The largest distance."""
+        return float(self.sizes[0])
+
+    def of(self, rows: Indices, joints: Indices | Ints) -> OffPath:
+        """Return the same with rows of the track and joints of the skeleton."""
+        each = tuple(rows[frames] for frames in self.frames)
+        return OffPath(self.sizes, each, np.asarray(joints, dtype=np.int64)[self.columns])
 
 
-def _finding(
-    subject: Subject,
-    track: Track,
-    skeleton: Skeleton,
-    pops: _Pops,
-    message: str,
-    size: str,
-) -> Finding:
-    each, first = track.of_each(pops.rows), int(pops.rows[0])
+def _finding(subject: Subject, track: Track, pops: OffPath, message: str, size: str) -> Finding:
+    each, first = track.of_each(np.concatenate(pops.frames)), int(pops.frames[0][0])
     return subject.found(
         message,
         n=counted(len(each), "frame", of=track.n_frames),
         all=track.n_frames,
-        joint=joint_labels(skeleton)[int(pops.joints[0])],
+        joint=joint_labels(subject.actor.figure.require_skeleton())[int(pops.columns[0])],
         size=size,
         frame=int(track.numbers[first]),
         time=float(track.times[first]),
         part="clip",
-        joints=distinct(pops.joints),
+        joints=distinct(pops.columns),
         frames=track.numbers[each],
         times=track.times[each],
         at=("frames", first),
     )
 
 
-def _pops(
-    track: Track, rows: Indices, values: Floats, joints: Indices | Ints, least: float
-) -> _Pops | None:
-    """Return pops of the values (F, N, C) of joints (N,) that exceed a size."""
-    off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-    columns = np.flatnonzero((np.linalg.norm(off, axis=2) > 0.5 * least).any(axis=0))
-    if len(columns) == 0:
-        return None
-    off, values = off[:, columns], values[:, columns]
-    known = _known(track, rows)[:, joints[columns]]
-    each = [_matches(values, off, known[1:-1], n_frames, least) for n_frames in _PATTERNS]
-    each += [_quick_matches(values, known, n_frames, least) for n_frames in _FOURTH]
-    _, frame, place = np.nonzero(each)
-    size = np.stack(each)[np.nonzero(each)]
+def _found(
+    values: Floats, known: Bools, shapes: tuple[_Shape, ...], least: float
+) -> OffPath | None:
+    """Return what has one of the shapes in values (F, N, C), and exceeds a size."""
+    differences = {order: np.diff(values, n=order, axis=0) for order in (1, 2, 3, 4)}
+    ends = ((_AROUND + 1, _AROUND + _LONGEST), (0, 0))
+    lengths = {
+        order: np.pad(np.linalg.norm(each, axis=2), ends) for order, each in differences.items()
+    }
+    each = [
+        _matches(values, differences[shape.order], lengths, known, shape, least) for shape in shapes
+    ]
+    size = np.concatenate([sizes for sizes, _, _ in each])
     if len(size) == 0:
         return None
     order = np.argsort(-size, kind="stable")
-    size, frame, place = size[order], frame[order], place[order]
-    found_joints = np.asarray(joints, dtype=np.int64)[columns[place]]
-    return _Pops(float(size[0]), rows[frame], found_joints)
+    frames = [
+        np.arange(first, first + max(shape.n_frames, 1))
+        for shape, (_, firsts, _) in zip(shapes, each, strict=True)
+        for first in firsts.tolist()
+    ]
+    columns = np.concatenate([columns for _, _, columns in each])
+    return OffPath(size[order], tuple(frames[k] for k in order.tolist()), columns[order])
 
 
-def _matches(values: Floats, off: Floats, known: Bools, n_frames: int, least: float) -> Floats:
-    """Return the size of pops of ``n_frames`` that begin in a frame, else 0: (F, N)."""
-    pattern = np.array(_PATTERNS[n_frames])
-    result, width = np.zeros(values.shape[:2]), len(pattern)
-    count = len(off) - width + 1
-    # Row r of a window is about the pop that begins in frame r + 2.
-    windows = np.lib.stride_tricks.sliding_window_view(off, width, axis=0)
-    fit = _fitted(windows, pattern, least)
-    if fit is None:
-        return result
-    size, errors = fit
-    peak = size * pattern.max()
-    lengths = np.linalg.norm(off, axis=2)
-    around = [*range(-_AROUND, 0), *range(width, width + _AROUND)]
-    others = largest_around(lengths, around)[:count]
-    steps = np.linalg.norm(np.diff(values, axis=0), axis=2)
-    # Two steps lead away and back; those before and after are the usual ones.
-    nearby = [*range(1 - _NEAR, 1), *range(2 + n_frames, 2 + n_frames + _NEAR)]
-    usual = largest_around(steps, nearby)[:count]
-    across = np.linalg.norm(values[n_frames + 2 :] - values[1 : -n_frames - 1], axis=2)[:count]
-    is_pop = (size > least) & (errors < _SHAPE * peak)
-    at_rest = (usual < _STEPS * size) & (peak > _OTHERS[n_frames - 1] * others)
-    is_pop &= (at_rest & (size > _RETURNS * across)) | (
-        (usual < _FAST_STEPS * size) & (peak > _FAST_OTHERS * others)
+def _matches(
+    values: Floats,
+    differences: Floats,
+    lengths: dict[int, Floats],
+    known: Bools,
+    shape: _Shape,
+    least: float,
+) -> tuple[Floats, Indices, Indices]:
+    """Return the sizes, first frames and columns of what has a shape: (P,) each."""
+    pattern, order, n_frames = shape.pattern(), shape.order, max(shape.n_frames, 1)
+    highest = float(np.abs(pattern).max())
+    # Row r of the differences is about frames r to r + order, so the shape begins ``order`` later.
+    beyond = max(_SEEN, order)
+    start = beyond - order
+    count = len(values) - beyond - n_frames - order + 1 - start
+    is_near = np.ones((max(count, 0), values.shape[1]), dtype=np.bool_)
+    for k, part in enumerate(np.abs(pattern).tolist()):
+        if part > _SHAPE * highest:
+            there = lengths[order][_AROUND + 1 + start + k :][: len(is_near)]
+            is_near &= there > (part - _SHAPE * highest) * least
+    rows, columns = np.nonzero(is_near)
+    rows += start
+    first, last = rows + order, rows + order + n_frames - 1
+    if len(rows) == 0:
+        return np.zeros(0), first, columns
+    # By least squares, the size is that of the projection onto the pattern.
+    windows = differences[rows[:, None] + np.arange(len(pattern)), columns[:, None]]
+    factors = np.einsum("npc,p->nc", windows, pattern) / (pattern @ pattern)
+    left = np.linalg.norm(windows - factors[:, None] * pattern[:, None], axis=2).max(axis=1)
+    size = np.linalg.norm(factors, axis=1)
+
+    def most(order: int, at: Indices, shifts: range) -> Floats:
+        """Return the largest of the lengths some rows away from others, 0 outside: (P,)."""
+        index = at[:, None] + np.array(shifts, dtype=np.int64) + _AROUND + 1
+        largest: Floats = lengths[order][index, columns[:, None]].max(axis=1, initial=0.0)
+        return largest
+
+    end = rows + len(pattern) - 1
+    others = np.maximum(
+        most(order, rows, range(-_AROUND, 0)), most(order, end, range(1, _AROUND + 1))
     )
-    is_pop &= np.lib.stride_tricks.sliding_window_view(known, width, axis=0).all(axis=2)
-    is_pop[:_SEEN] = is_pop[max(count - _SEEN, 0) :] = False
-    result[2 : 2 + count] = np.where(is_pop, size, 0.0)
-    return result
+    # The step into a frame is in the row before; another one leads back.
+    into, out = first - 1, last if shape.n_frames else first - 1
+    usual = np.maximum(most(1, into, range(-_NEAR, 0)), most(1, out, range(1, _NEAR + 1)))
+    usual = np.maximum(usual, most(1, into, range(1, shape.n_frames)))
+    is_found = (size > least) & (left < _SHAPE * highest * size)
+    is_found &= (highest * size > shape.others * others) & (usual < shape.steps * size)
+    if shape.returns:
+        across = np.linalg.norm(values[last + 1, columns] - values[into, columns], axis=1)
+        is_found &= size > _RETURNS * across
+    if shape.alike:
+        beside = np.stack([most(1, into, range(-1, 0)), most(1, out, range(1, 2))])
+        alike = beside.min(axis=0) > _ALIKE * beside.max(axis=0)
+        is_found &= alike | (beside.max(axis=0) < _SHORT * size)
+    frames = np.arange(-order, n_frames + order)
+    is_found &= known[first[:, None] + frames, columns[:, None]].all(axis=1)
+    return size[is_found], first[is_found], columns[is_found]
 
 
-def _fitted(windows: Floats, pattern: Floats, least: float) -> tuple[Floats, Floats] | None:
-    """Return the size of a pattern in windows (F, N, 3, P) by least squares, and the error left.
-
-    (F, N) each; None if no size exceeds ``least``.
-    """
-    factors = windows @ pattern / (pattern @ pattern)
-    size = np.linalg.norm(factors, axis=2)
-    if not (size > least).any():
+def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
+    """Return the steps in whose frames other joints move, but none has an edge."""
+    if found is None:
         return None
-    return size, np.linalg.norm(windows - factors[..., None] * pattern, axis=2).max(axis=2)
-
-
-def _quick_matches(values: Floats, known: Bools, n_frames: int, least: float) -> Floats:
-    """Return the size of pops of ``n_frames`` by fourth differences, else 0: (F, N)."""
-    pattern, result = np.array(_FOURTH[n_frames]), np.zeros(values.shape[:2])
-    width, fourth = len(pattern), np.diff(values, n=4, axis=0)
-    count = len(fourth) - width + 1
-    if count <= 0:
-        return result
-    # Row r of a window is about the pop that begins in frame r + 4.
-    windows = np.lib.stride_tricks.sliding_window_view(fourth, width, axis=0)
-    fit = _fitted(windows, pattern, least)
-    if fit is None:
-        return result
-    size, errors = fit
-    peak = size * np.abs(pattern).max()
-    around = [*range(-_AROUND, 0), *range(width, width + _AROUND)]
-    others = largest_around(np.linalg.norm(fourth, axis=2), around)[:count]
-    steps = np.linalg.norm(np.diff(values, axis=0), axis=2)
-    usual = largest_around(steps, [*range(-1, 3), *range(4 + n_frames, 8 + n_frames)])[:count]
-    beside = np.stack([steps[2 : 2 + count], steps[4 + n_frames :][:count]])
-    alike = beside.min(axis=0) > _ALIKE * beside.max(axis=0)
-    is_pop = (size > least) & (errors < _SHAPE * peak) & (peak > _QUICK_OTHERS * others)
-    is_pop &= (usual < _QUICK_STEPS * size) & (alike | (beside.max(axis=0) < _SHORT * size))
-    is_pop &= np.lib.stride_tricks.sliding_window_view(known, width + 4, axis=0).all(axis=2)
-    result[4 : 4 + count] = np.where(is_pop, size, 0.0)
-    return result
+    # Half a third difference is the edge of a step: x = 0 0 1 1 has -2 = 1 - 3.
+    edges = 0.5 * np.linalg.norm(np.diff(values, n=3, axis=0), axis=2)
+    firsts = np.array([int(frames[0]) for frames in found.frames])
+    others = edges[firsts - 2]
+    others[np.arange(len(firsts)), found.columns] = 0.0
+    moving = np.linalg.norm(np.diff(values, axis=0), axis=2)[firsts - 1] > _MOVES
+    go_on = moving.sum(axis=1) - 1 >= _GO_ON
+    keep = np.flatnonzero(go_on & (others.max(axis=1) < _ALONE * found.sizes))
+    if len(keep) == 0:
+        return None
+    each = tuple(found.frames[k] for k in keep.tolist())
+    return OffPath(found.sizes[keep], each, found.columns[keep])
 
 
 def _known(track: Track, rows: Indices) -> Bools:

@@ -20,9 +20,9 @@ from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.transform_clip import Animation, TransformChannel, TransformClip
 from viewer.rigs.skeleton import FIRST_ROTATION, joint_labels
 
-_LONGEST = 2  # maximum number of keys of a pop
-_BOTH = 0.5  # minimum ratio of the errors of both keys of a pop: one alone leaves 0 for the other
+_ALL = 0.5  # minimum ratio of the errors of the keys of a pop: those beside it are on the path
 _USUAL = 4.0  # minimum ratio of the error to the median of all keys: others pop at that time
+_PATHS = {"C020.rotation": "rotation", "C020.position": "translation"}
 _ON_KEY = 0.25  # maximum distance of a key from the frame of a finding, in steps between keys
 
 
@@ -100,7 +100,9 @@ def _without_pops(
     subject: Subject, finding: Finding, clip: _Motion, times: Floats
 ) -> tuple[_Motion | None, str]:
     """Replace keys that pop by what those before and after them say."""
-    path = "rotation" if finding.diagnostic.key == "C020.rotation" else "translation"
+    if finding.diagnostic.key not in _PATHS:
+        return None, ""  # which side of a step is right is not known
+    path = _PATHS[finding.diagnostic.key]
     joints = set(finding.joints.tolist())
     said = f"{path} of {{joints}} interpolated at {{n}}"
     if isinstance(clip, TransformClip):
@@ -146,20 +148,17 @@ def _errors(
 
 
 def _popping(keys: Floats, times: Floats, errors: Callable[[int, int], Floats]) -> np.ndarray:
-    """Return which keys pop, given the frames in which pops begin: (N,)."""
-    pops = np.zeros(len(keys), dtype=np.bool_)
+    """Return which keys pop, given the frames in which some joint does: (N,)."""
+    pops, near = np.zeros((2, len(keys)), dtype=np.bool_)
     step = float(np.median(np.diff(keys)))
     usual = float(np.median([errors(k, 1)[0] for k in range(1, len(keys) - 1)]))
     for time in times.tolist():
-        first = int(np.abs(keys - time).argmin())
-        if abs(keys[first] - time) > _ON_KEY * step or not 0 < first < len(keys) - 1:
-            continue
-        count = 1
-        if first + _LONGEST < len(keys):
-            both = errors(first, _LONGEST)
-            count = _LONGEST if both.min() > _BOTH * both.max() else 1
-        if errors(first, count).min() > _USUAL * usual:
-            pops[first : first + count] = True
+        key = int(np.abs(keys - time).argmin())
+        near[key] |= abs(keys[key] - time) <= _ON_KEY * step
+    for first, stop in runs_of(near):
+        if first > 0 and stop < len(keys):
+            found = errors(first, stop - first)
+            pops[first:stop] = found > max(_USUAL * usual, _ALL * float(found.max()))
     return pops
 
 
