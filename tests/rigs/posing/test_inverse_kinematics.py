@@ -295,6 +295,31 @@ def test_drag_follows_a_reachable_path_exactly_and_hardly_faster_than_the_path()
     assert angles_between(skeleton, dofs).max() <= 1.1 * angles_between(skeleton, known).max()
 
 
+@pytest.mark.parametrize("seed", [1, 8])
+def test_limits_do_not_catch_a_hand_on_its_way_along_a_path_that_it_can_follow(seed):
+    # The path is that of a collar, a shoulder and a hinge that wave within their limits. An arm
+    # that only rotates as little as possible is caught by its limits, 7 to 13 cm from the targets.
+    joints = np.array([[0.0, 1.4, 0], [0.12, 1.4, 0], [0.4, 1.4, 0], [0.65, 1.4, 0]])
+    skeleton = ball_skeleton(("collar", "shoulder", "elbow", "hand"), np.arange(-1, 3), joints)
+    collar = np.radians([[-10, 10], [-20, 20], [-20, 20]])
+    limits = np.concatenate([collar, NARROW_SHOULDER, HINGE, np.zeros((3, 2))])
+    skeleton = replace(skeleton, dof_limits=limits)
+    rng, times = np.random.default_rng(seed), np.linspace(0.0, 2.0 * np.pi, 240)[:, None]
+    path = np.zeros((240, 12))
+    path[:, 7] = -1.0  # the hinge
+    for rank in (1, 2, 3, 4):
+        size, phase = 0.7 * rng.normal(size=12) / rank, rng.uniform(0.0, 6.0, 12)
+        path += size * np.sin(rank * times + phase)
+    path = np.clip(path, *limits.T)
+    pose, targets = rest_pose(skeleton), []
+    for row in path:
+        pose.dofs[:] = row
+        targets.append(world_matrices(skeleton, pose)[3, :3, 3])
+    pose.dofs[:] = path[0]
+    reaching = Reaching(skeleton, pose, 3, 3)
+    assert max(reaching.follow(target).distance for target in targets) < 0.001
+
+
 @pytest.mark.parametrize("tilt", [-1.2, -1.0, 0.6])
 def test_stiff_arm_turns_by_the_arc_of_its_hand_beside_gimbal_lock(tilt):
     # The shortest rotation that leads a hand along a great circle is the angle of its arc. Near

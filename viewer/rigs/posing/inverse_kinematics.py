@@ -53,6 +53,9 @@ _ASIDE = 0.02
 _RATE = np.radians(5.0) * 50.0
 _MOST_NEEDED = 3.0  # what a target that is followed may need, relative to _RATE
 _RETURN = 0.05  # rotation towards the pose at the start that leaves the joint in place, of _RATE
+# Rotation away from a limit that leaves the joint in place, of _RATE, and the distance to the limit
+# from which it starts. It is several times _RETURN, so that the start does not hold DOFs at limits.
+_AVOID, _ROOM = 0.3, np.radians(25.0)
 _GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
 _MARGIN = 1.25  # of what a step needs, which is known by its linearisation
 # Maximum steps per call towards the target, and in a search for another pose: they bound the time
@@ -253,6 +256,9 @@ class Reaching:
         self._of_joint = np.unique(skeleton.dof_joints[self._rows], return_inverse=True)[1]
         self._is_same_joint = self._of_joint[:, None] == self._of_joint
         self._low, self._high = skeleton.dof_limits[self._rows].T
+        # DOFs with a range below twice _ROOM are at ease in its middle.
+        room = np.minimum(_ROOM, 0.5 * (self._high - self._low))
+        self._inner_low, self._inner_high = self._low + room, self._high - room
         self._dofs[self._rows] = np.clip(self._dofs[self._rows], self._low, self._high)
         position = position_of(skeleton, start, joint, self._rows)
         self._first = _State(position, self._dofs[self._rows])
@@ -286,7 +292,7 @@ class Reaching:
             needs = self._turn(needed) / (_RATE * moved)
             most = _RATE * moved * min(max(1.0, _MARGIN * needs), _MOST_NEEDED)
         self._target, self._wanted = target, wanted
-        goal = self._returned(self._goal, _RETURN * _RATE * moved, inverse)
+        goal = self._eased(self._goal, _RATE * moved, inverse)
         goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
         self._since_held += moved
         is_held = is_settled and self._left(goal) > _MISSED * self._size
@@ -426,18 +432,23 @@ class Reaching:
                 for row in np.flatnonzero(stopped):
                     inverse = inverse - np.outer(inverse[:, row], inverse[row]) / inverse[row, row]
 
-    def _returned(self, state: _State, most: float, inverse: Floats) -> _State:
-        """Return a state nearer to the pose at the start, if that leaves the joint in place.
+    def _eased(self, state: _State, most: float, inverse: Floats) -> _State:
+        """Return a state nearer to the start, and away from limits, if the joint stays in place.
 
         Steps by the pseudoinverse alone end in another pose after each loop of the target (Klein
-        and Huang 1983), so that a limb would twist during long drags.
+        and Huang 1983), so that a limb would twist during long drags. They also press DOFs against
+        limits one by one, until none is left to follow the target, though other poses could.
         """
         # Downhill in the squared difference of DOFs, in the metric of the rotations.
-        downhill = inverse @ (self._first.values - state.values) / inverse.diagonal().max()
-        wish = np.clip(downhill, -most, most)
+        values = state.values
+        downhill = inverse @ (self._first.values - values) / inverse.diagonal().max()
+        wish = np.clip(downhill, -_RETURN * most, _RETURN * most)
+        # Downhill in the squared distance to the middle, where no limit is nearer than _ROOM.
+        above, below = self._inner_low - values, values - self._inner_high
+        wish += _AVOID * most / _ROOM * (np.maximum(above, 0.0) - np.maximum(below, 0.0))
         if not wish.any():
             return state
-        nearer = state.at(state.values + self._step(state, np.zeros(3), self._damping, wish))
+        nearer = state.at(values + self._step(state, np.zeros(3), self._damping, wish))
         is_in_place = math.dist(nearer.place, state.place) <= _MISSED * self._size
         return nearer if is_in_place or self._left(nearer) <= self._left(state) else state
 
