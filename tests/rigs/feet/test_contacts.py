@@ -49,6 +49,24 @@ def test_feet_of_captures_may_slide_but_not_rise(slips):
     assert contacts(moving(0.1, Y), slips=slips) == []
 
 
+@pytest.mark.parametrize(("swing", "is_found"), [(2.5, False), (7.5, True)])
+def test_standing_feet_may_move_faster_the_faster_the_feet_swing(swing, is_found):
+    # Feet stand for 0.2 s in turn, and roll meanwhile at 0.2: 2.5 times the limit of a walk.
+    rate, count, half = 120.0, 240, 24
+    stands = np.arange(count) // half % 2 == 0
+    feet = []
+    for is_down in (stands, ~stands):
+        path = np.cumsum(np.where(is_down, 0.2, swing))[:, None] / rate * Z
+        path = path + np.where(is_down, 0.0, 0.1)[:, None] * Y
+        feet.append(FootPath(path, path, path + 0.5 * Y))
+    left, right = foot_contacts(feet, [(0, count)], rate, 1.0, Y)
+    assert (len(left), len(right)) == ((5, 5) if is_found else (0, 0))
+    for number, one in enumerate(left):
+        # The window of the speeds, a third of 0.1 s, blurs the ends of a step by half of itself.
+        begin = 2 * half * number
+        assert abs(one.start - begin) <= 2 and abs(one.stop - begin - half) <= 2
+
+
 def test_contacts_end_at_gaps_and_last_at_least_a_tenth_of_a_second():
     assert contacts(moving(0.0), [(0, 10), (11, 13), (14, COUNT)]) == [(0, 10), (14, COUNT)]
 

@@ -12,11 +12,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import percentile_filter
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.curves import falling
+
+# Percentage of the rows of a stride in which the faster foot is slower than where it swings.
+_SWINGING = 80
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +80,7 @@ def foot_contacts(
     #   4. its rows get a hold of 1 at speeds up to SLOW, falling smoothly to 0 at FAST: the planner
     #      fixes the former and lets go of the latter.
     lows = np.array([foot.lowest(up) for foot in feet])
+    pace = _paces(feet, spans, rate, size, up)
     result = []
     for number, foot in enumerate(feet):
         others = np.delete(lows, number, axis=0)
@@ -83,12 +88,14 @@ def foot_contacts(
         found = []
         for first, last in spans:
             part = slice(first, last)
-            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up, slips)
+            (toe, heel), speeds = _stands(
+                foot, part, lows[number], rate, size, up, slips, pace[part]
+            )
             slow = (np.where(toe, *speeds) / size - limits.SLOW) / (limits.FAST - limits.SLOW)
             hold = falling(slow)
             for a, b in runs_of(toe | heel):
                 rows = slice(first + a, first + b)
-                if b - a < _shortest(rate) or not is_lowest[rows].any():
+                if b - a < _shortest(rate, pace[rows]) or not is_lowest[rows].any():
                     continue
                 held = hold[a:b] * _eased(b - a, (a > 0, first + b < last), ease * rate)
                 one = _contact(foot, rows.start, (toe[a:b], heel[a:b]), hold[a:b], held, up)
@@ -127,8 +134,27 @@ def _eased(count: int, is_open: tuple[bool, bool], ease: float) -> Floats:
     return 1.0 - falling(np.minimum(begin, end[::-1]) / span)
 
 
-def _shortest(rate: float) -> int:
-    return max(2, round(limits.SHORTEST * rate))
+def _shortest(rate: float, pace: Floats) -> int:
+    return max(2, round(limits.SHORTEST * rate / float(np.median(pace))))
+
+
+def _paces(
+    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+) -> Floats:
+    """Return how many times faster than in a walk the feet swing around each row: (N,), 1 to 4."""
+    # Steps of a run are shorter, and its feet stand less still: they roll faster from heel to ball.
+    across, result = along_ground(up), np.ones(len(feet[0].toe))
+    for first, last in spans:
+        speeds = [
+            mean_speeds(points[first:last] @ across, rate)
+            for foot in feet
+            for points in (foot.toe, foot.heel)
+        ]
+        # Some foot swings for most of a stride; the percentile ignores a glitch of the recording.
+        stride = 2 * round(0.5 * limits.STRIDE * rate) + 1
+        usual = percentile_filter(np.max(speeds, axis=0), _SWINGING, stride, mode="nearest")
+        result[first:last] = np.clip(usual / (limits.WALKS * size), 1.0, limits.FASTEST)
+    return result
 
 
 def _stands(
@@ -139,6 +165,7 @@ def _stands(
     size: float,
     up: Floats,
     slips: float,
+    pace: Floats,
 ) -> tuple[list[Bools], list[Floats]]:
     """Return the rows of a part in which the ball and the heel are in contact, and their speeds."""
     found, paces = [], []
@@ -146,13 +173,16 @@ def _stands(
         high = points @ up
         above = high - lows[part]
         # Speeds in a space whose horizontal axes are compressed, so that sliding counts less.
-        squeezed = points if slips == 1.0 else (points + (slips - 1.0) * high[:, None] * up) / slips
-        speeds = mean_speeds(squeezed, rate)
+        half = np.maximum(1, np.round(0.5 * limits.WINDOW * rate / pace)).astype(np.int32)
+        velocities = _mean_velocities(points, rate, half)
+        rises = velocities @ up
+        slides = np.linalg.norm(velocities - rises[:, None] * up, axis=1) / (slips * pace)
+        speeds = np.hypot(slides, rises)
         begins = (above < limits.LOW * size) & (speeds < limits.SLOW * size)
         lasts = (above < limits.HIGH * size) & (speeds < limits.FAST * size)
         stands = np.zeros(len(points), dtype=np.bool_)
         for a, b in runs_of(lasts):
-            if b - a >= _shortest(rate) and begins[a:b].any():
+            if b - a >= _shortest(rate, pace[a:b]) and begins[a:b].any():
                 stands[a:b] = True
         found.append(stands)
         paces.append(speeds)
@@ -203,11 +233,14 @@ def along_ground(up: Floats) -> Floats:
 
 def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
-    half = half_window(rate)
+    return np.linalg.norm(_mean_velocities(places, rate, half_window(rate)), axis=1)
+
+
+def _mean_velocities(places: Floats, rate: float, half: int | Ints) -> Floats:
+    """Return velocities (N, 3) averaged over ``half`` rows before and after each row."""
     frames = np.arange(len(places))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
-    moved = np.linalg.norm(places[after] - places[before], axis=1)
-    return moved * rate / np.maximum(after - before, 1)
+    return (places[after] - places[before]) * (rate / np.maximum(after - before, 1))[:, None]
 
 
 def slowest_points(

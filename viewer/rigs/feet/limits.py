@@ -26,6 +26,12 @@ WINDOW = 0.1
 """Seconds over which speeds are averaged: shorter than any step, longer than the noise."""
 SHORTEST = 0.1
 """Minimum duration of a contact, seconds: steps of a sprint last about as long."""
+WALKS, FASTEST = 2.5, 4.0
+"""Speed of swinging feet up to which a person walks, and the largest multiple of it: in proportion,
+standing feet of runs may move faster along the ground, and ``WINDOW`` and ``SHORTEST`` are shorter.
+Feet of labelled walks swing at 1 to 2.7."""
+STRIDE = 1.0
+"""Seconds over which the speed of swings is looked for, at least one step of both feet."""
 LOWEST = 0.02
 """A standing foot is, at some time, no more than this above all others: a foot held still in the
 air is not."""
