@@ -254,6 +254,18 @@ def turned() -> Figure:
     return replace(body(), skin=replace(body().skin, inverse_bind=binds))
 
 
+def lying() -> Figure:
+    """Return the body whose z axis, not its y axis, is said to point up."""
+    return replace(body(), up="z")
+
+
+def bound_elsewhere() -> Figure:
+    """Return the body whose head is bound 100 mm above its place at rest."""
+    binds = body().skin.inverse_bind.copy()
+    binds[joint("head"), 1, 3] -= 0.1
+    return replace(body(), skin=replace(body().skin, inverse_bind=binds))
+
+
 def flattened() -> Figure:
     """Return the body whose left elbow is at its shoulder."""
     return moved(("left_elbow", list(-body().skeleton.rest_translations[joint("left_elbow")])))
@@ -340,6 +352,8 @@ FAULTS = {
         lambda: moved(("left_elbow", [0.0, 0.1, 0.0])), "Y003.joints",
         ["left_elbow", "right_elbow"], [],
     ),
+    "lying": (lying, "S013.lies", ["head", "left_ankle", "right_ankle"], []),
+    "bound elsewhere": (bound_elsewhere, "B007.places", ["head"], []),
     "bound with 30 degrees": (turned, "B007.rotations", ["left_knee"], []),
     "bound with 30 degrees in another pose": (
         turned_in_another_pose, "B007.rotations", ["left_knee"], []

@@ -11,6 +11,7 @@ from linting.test_bad_keys import FRAMES, RATE, K, about_z, arm, waving
 from linting.test_bad_rigs import (
     NOSE,
     body,
+    bound_elsewhere,
     joint,
     noisy,
     renamed,
@@ -27,6 +28,7 @@ from linting.test_bad_rigs import (
 from linting.test_bad_rigs import weighted as shaped_by
 
 from viewer.cli import run
+from viewer.diagnostics import note
 from viewer.diagnostics.codes import CODES
 from viewer.exporters import export
 from viewer.linting import (
@@ -105,6 +107,27 @@ def test_actors_of_one_figure_play_the_fixed_animation_of_their_own():
         assert actor.figure.animations[0].plays(actor.clip)
 
 
+def test_finding_that_an_earlier_fix_settles_is_not_fixed(monkeypatch):
+    """A leak makes the seams between rigid parts seem torn; without it, they are not."""
+    fixed_codes, leaks = list[str](), weighted({})
+
+    def found(scene, _options):
+        subject = Subject(scene.actors[0], 0)
+        if subject.actor.figure is not leaks:
+            return []
+        torn = subject.found("W014.seams: torn", joints=[0], at=("weights", 0))
+        return [torn, subject.found("W011.strays: a leak", joints=[0], at=("weights", 0))]
+
+    def fix(subject, finding):
+        fixed_codes.append(finding.code)
+        subject.actor.figure = replace(subject.actor.figure, name="fixed")
+        return note("X007.names: fixed")
+
+    monkeypatch.setattr("viewer.linting.fixes.lint_scene", found)
+    monkeypatch.setattr(weights_fix, "fix", fix)
+    assert fix_scene(Scene([Actor(leaks)])).codes == {"W011"} and fixed_codes == ["W011"]
+
+
 def test_vertex_without_weights_gets_those_of_its_neighbours():
     """Of vertex 11, two are below it, with joint 0, two above, and two on its ring, with both."""
     figure, _ = fixed(weighted({11: []}), weights)
@@ -181,6 +204,8 @@ def test_names_and_bindings_are_corrected():
     figure, note = fixed(renamed(), symmetry)
     assert figure.skeleton.names == body().skeleton.names and "knee" in note
     figure, _ = fixed(turned(), bindings)
+    np.testing.assert_allclose(figure.skin.inverse_bind, body().skin.inverse_bind, atol=1e-9)
+    figure, _ = fixed(bound_elsewhere(), bindings)
     np.testing.assert_allclose(figure.skin.inverse_bind, body().skin.inverse_bind, atol=1e-9)
     # The shin is nearly perpendicular to z, about which its binding was rotated: the rest of that
     # rotation, about the shin, is not seen.

@@ -106,7 +106,7 @@ CODES: dict[str, Code] = {
         "warning", "reflected bind matrix", "freeze the negative scale and rebind this joint"
     ),
     "B006": Code("error", "non-affine bind matrix", "set its last row to 0 0 0 1"),
-    "B007": Code("warning", "rotated binding", "rebind these joints at rest"),
+    "B007": Code("warning", "rotated or shifted binding", "rebind these joints at rest"),
     # Skeletons and their limits
     "S001": Code("error", "parent after its child", "list parents before their children"),
     "S002": Code("error", "cyclic hierarchy", "give one of these joints another parent"),
@@ -124,7 +124,9 @@ CODES: dict[str, Code] = {
     "S010": Code("warning", "non-positive rest scale", "freeze the scale of this joint"),
     "S011": Code("warning", "bone without length", "move the joint to the end of its bone"),
     "S012": Code("warning", "joint outside the mesh", "move the joint into the limb"),
-    "S013": Code("warning", "upside-down rig", "rotate the figure, or correct its up axis"),
+    "S013": Code(
+        "warning", "upside-down or lying rig", "rotate the figure, or correct its up axis"
+    ),
     "S014": Code(
         "warning", "rotation limits in degrees", "write them in radians, or none for wheels"
     ),

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewer.linting._finding import Finding
+from viewer.linting._mirror import name_partners
 from viewer.linting._subject import Indices, Subject
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
@@ -26,6 +27,7 @@ _ASTRAY = np.radians(5.0)  # smallest rotation of a joint that is seen
 _SHORT = 1e-3  # relative length below which a bone has no direction
 _SEVERAL = 8  # minimum number of joints that show what is usual
 _FEW = 0.25  # maximum fraction of joints that are exceptions
+_SHIFTED = 0.02  # smallest distance, in sizes, of a single joint from where it was bound
 
 
 def check(subject: Subject) -> Iterator[Finding]:
@@ -37,6 +39,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     usable = subject.valid("bindings", figure.skin.n_joints) & are_usable(figure.skin)
     yield from _elsewhere(subject, figure, usable)
     yield from _rotated(subject, figure, usable)
+    yield from _shifted(subject, figure, usable)
 
 
 def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
@@ -101,6 +104,47 @@ def _rotated(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Findin
         names=listed([labels[joint] for joint in joints]),
         joint=labels[joints[0]],
         angle=float(np.degrees(angles[off[0]])),
+        joints=joints,
+        at=("bindings", int(joints[0])),
+    )
+
+
+def _shifted(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
+    """Report single joints that are bound at another place than at rest, while most are not."""
+    skin, skeleton = figure.skin, figure.skeleton
+    if skin is None or skeleton is None or figure.mesh is None:
+        return
+    used = np.flatnonzero(moves_vertices(skin) & _placed(subject, skeleton) & usable)
+    if len(used) < _SEVERAL:
+        return
+    # Where each joint (J) is at rest, and where the movement of each (R) would put it.
+    moves = world_matrices(skeleton, rest_pose(skeleton))[used] @ skin.inverse_bind[used]
+    places = bind_positions(skin)[used]
+    put = np.einsum("rab,jb->rja", moves[:, :3, :3], places) + moves[:, None, :3, 3]
+    apart = np.linalg.norm(put - np.einsum("jja->ja", put), axis=2)
+    limit = _SHIFTED * subject.size()
+    usual = int((apart < limit).sum(axis=1).argmax())
+    distances, is_off = np.zeros((2, skeleton.n_joints))
+    distances[used] = apart[usual]
+    is_off[used] = apart[usual] > limit
+    # Joints below one that is shifted move with it. Both sides are shifted in another pose.
+    row = np.full(skeleton.n_joints, -1)
+    row[used] = np.arange(len(used))
+    partners, off = name_partners(skeleton), list[int]()
+    for joint in np.flatnonzero(is_off).tolist():
+        above, other = row[skeleton.parents[joint]], int(partners[joint])
+        follows = skeleton.parents[joint] >= 0 and above >= 0 and apart[above, row[joint]] < limit
+        if not follows and not (other not in (-1, joint) and is_off[other]):
+            off.append(joint)
+    if not off or is_off.sum() > 0.5 * len(used) or len(off) > _FEW * len(used):
+        return  # a note says that bind and rest pose differ
+    joints, labels = np.array(off)[np.argsort(-distances[off])], joint_labels(skeleton)
+    yield subject.found(
+        "B007.places: {n} bound elsewhere than at rest: {names} (worst: {joint} by {distance})",
+        n=counted(len(joints), "joint", "is", "are"),
+        names=listed([labels[joint] for joint in joints]),
+        joint=labels[joints[0]],
+        distance=subject.length(float(distances[joints[0]])),
         joints=joints,
         at=("bindings", int(joints[0])),
     )

@@ -1,4 +1,4 @@
-"""Checks of where joints are: on their parent, outside the limb, or upside down."""
+"""Checks of where joints are: on their parent, outside the limb, upside down, or lying."""
 
 from __future__ import annotations
 
@@ -29,6 +29,9 @@ _INSIDE = ("elbow", "wrist", "knee", "ankle")  # joints in the middle of a limb
 _FEET = ("left_ankle", "right_ankle", "left_foot", "right_foot")
 _PAWS = ("foot", "paw", "hoof", "toe", "toes")
 _NEARLY_ALL = 0.9  # fraction of the frames: nobody stands on the hands for longer
+# If axes were exchanged, a line from the feet to the head is level. Infants are modelled lying, but
+# with bent legs.
+_LONG, _LEVEL = 0.3, 0.15  # minimum length of that line, in sizes, and its maximum slope
 _BELOW = 0.05  # minimum depth of a head below the feet, relative to the size
 
 
@@ -47,7 +50,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     if figure.mesh.n_vertices >= FEWEST:
         yield from _zero_lengths(subject, figure, places, size)
         yield from _outside(subject, figure, places, meanings)
-    yield from _upside_down(subject, figure, places, meanings, size)
+    inverted = [*_upside_down(subject, figure, places, meanings, size)]
+    yield from inverted or _lies(subject, figure, places, meanings, size)
 
 
 def _zero_lengths(
@@ -149,6 +153,28 @@ def _upside_down(
             part="skeleton",
             joints=[*heads[:1], *feet[:2]],
             at=("joints", heads[0]),
+        )
+
+
+def _lies(
+    subject: Subject, figure: Figure, places: Floats, meanings: tuple[str, ...], size: float
+) -> Iterator[Finding]:
+    """Report a person whose head and feet are far apart across the up axis only."""
+    wanted = ("head", "left_ankle", "right_ankle")
+    if not all(name in meanings for name in wanted):
+        return  # animals have their heads before their feet
+    joints = [meanings.index(name) for name in wanted]
+    along = places[joints[0]] - places[joints[1:]].mean(axis=0)
+    height = float(along["xyz".index(figure.up)])
+    length = float(np.linalg.norm(along))
+    if length > _LONG * size and abs(height) < _LEVEL * length:
+        yield subject.found(
+            "S013.lies: the figure lies at rest: its head is {length} from its feet, across {up}",
+            length=subject.length(length),
+            up=figure.up,
+            part="skeleton",
+            joints=joints,
+            at=("joints", joints[0]),
         )
 
 

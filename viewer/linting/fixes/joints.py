@@ -1,4 +1,4 @@
-"""Fixes of joints: names on the wrong side, and rotated bindings."""
+"""Fixes of joints: names on the wrong side, and rotated and shifted bindings."""
 
 from __future__ import annotations
 
