@@ -97,6 +97,9 @@ def test_bones_outside_the_mesh_are_counted():
     found = values(body(joints=bent))
     # It is inside up to y = 0.2: at the first of the places 0.2, 0.4 ... 1.8.
     assert found["inside"].value == pytest.approx((9 + 1) / 18, abs=1 / 18)
+    # Most bones may be inside, but each of them counts, here to the tolerance of a voxel of 0.05.
+    assert found["bone"].value == pytest.approx(1 / 9) and found["bone"].rating == 0.0
+    assert values(body(joints=JOINTS + np.array([0, 0.24, 0])))["bone"].value == 1.0
     far = values(body(joints=JOINTS + np.array([0, 0, 9.0])))
     assert far["inside"].value == 0.0 and far["depth"].value == 0.0
 
