@@ -88,6 +88,19 @@ def ear(side):
     return Limb(points, np.full(2, 0.04), points[1], 0.4)
 
 
+def hanging(touching=()):
+    """Return a person whose hands are at y = 0.4, and touch the thighs on some sides (+1, -1)."""
+    parts = [
+        ball_chain((0, 0.65, 0, 0.12), (0, 1.0, 0, 0.12)),
+        ball_chain((0, 1.05, 0, 0.05), (0, 1.24, 0, 0.05)),
+        [(0, 1.24, 0, 0.12)],
+        *both((0.1, 0.6, 0, 0.06), (0.1, 0.04, 0, 0.05), (0.1, 0.04, 0.14, 0.04)),
+        *both((0.1, 1.0, 0, 0.05), (0.26, 1.0, 0, 0.05), (0.28, 0.4, 0, 0.05)),
+        *([(0.2 * side, 0.45, 0, 0.06)] for side in touching),
+    ]
+    return mesh(*parts)
+
+
 @pytest.fixture(scope="module")
 def standing():
     """Return the anatomy of a person whose sides are known."""
@@ -111,6 +124,17 @@ def test_limbs_and_head_of_a_person_are_found_whatever_the_size_of_the_head(head
     np.testing.assert_allclose(points.positions[row], [0, 1.12 + head, 0], atol=0.03 * size)
     # A voxel is 0.016 to 0.02 wide, and the sphere's inscribed polyhedron 5 % smaller.
     assert 0.95 * head - 0.04 < points.radii[row] < head
+
+
+@pytest.mark.parametrize("touching", [(), (1,), (-1,)])
+def test_hand_that_touches_a_thigh_is_the_end_of_its_arm(touching):
+    # The way from the plane to this hand is shorter through the thigh than through the arm, so
+    # that the elbow is farther away.
+    anatomy = anatomy_of(*hanging(touching), UP, np.array([1.0, 0, 0]))
+    arms = max(anatomy.pairs, key=lambda pair: abs(pair.limbs[0].points[0][0]))
+    heights = [limb.points[0][1] for limb in arms.limbs]
+    np.testing.assert_allclose(heights, 0.35, atol=0.05)
+    np.testing.assert_allclose([limb.points[-1][1] for limb in arms.limbs], 1.0, atol=0.1)
 
 
 def test_ears_as_long_as_arms_are_another_pair():

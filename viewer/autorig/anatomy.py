@@ -9,7 +9,9 @@ Found in the voxels of its solid, given only the up axis:
   as the protrusion is longer than others that it merges with (persistence; Edelsbrunner et al.
   2002). Hands and feet are found so in any pose in which they do not touch other parts, whatever
   the proportions; fingers and toes merge into one tip.
-- The tips of both sides are paired by length, place of attachment and mirrored position.
+- The tips of both sides are paired by length, place of attachment and mirrored position. Where a
+  hand touches a thigh, either the hand or the elbow is the farthest place from the plane: if the
+  mirror image of the longer arm is inside the solid, it is the other arm.
 - A limb's axis is the path from its tip to the plane that prefers voxels far from the surface. Its
   junction with the trunk is where the radius exceeds the smallest one of the upper limb by half.
 - The neck is where the radius along the path to the top of the head is smallest between two wider
@@ -215,9 +217,29 @@ def _divided(
         )
         for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
     ]
-    pairs = paired(limbs, sides[tips] > 0.0, lateral, offset, size, _POSED)[:_MOST_PAIRS]
+    found = paired(limbs, sides[tips] > 0.0, lateral, offset, size, _POSED)[:_MOST_PAIRS]
+    pairs = tuple(_both_whole(solid, paths, pair, lateral, offset, size) for pair in found)
     report_fraction(1.0, "finding limbs")
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
+
+
+def _both_whole(
+    solid: Solid, paths: Paths, pair: LimbPair, lateral: Floats, offset: float, size: float
+) -> LimbPair:
+    """Replace a limb by the mirror image of a much longer one if that is inside the solid, too."""
+    lengths = [float(arc_lengths(limb.points)[-1]) for limb in pair.limbs]
+    if abs(lengths[0] - lengths[1]) < _PROMINENT * size:
+        return pair
+    longer = pair.limbs[int(np.argmax(lengths))]
+    places = np.concatenate([longer.points, longer.attachment[None]])
+    mirrored = places - 2.0 * (places @ lateral - offset)[:, None] * lateral
+    # Within one voxel, the mirror image of the boundary is inside or outside by chance.
+    if solid.gaps(mirrored).max() > 1.5 * solid.spacing:
+        return pair
+    rows = solid.nearest(mirrored)
+    centers = solid.centers(solid.voxels[rows])
+    other = Limb(centers[:-1], paths.radii[rows[:-1]], centers[-1], longer.length)
+    return LimbPair((longer, other) if longer is pair.limbs[0] else (other, longer))
 
 
 def sagittal_plane(
