@@ -235,6 +235,8 @@ class JointData(TypedDict):
     """Name that is unique in the skeleton."""
     parent: int
     """Index of its parent; -1 for a root."""
+    position: list[float]
+    """x, y and z in the scene, in the current pose."""
 
 
 class DofData(TypedDict):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -24,6 +25,20 @@ def describe(capsys):
     return info
 
 
+def test_joints_are_listed_with_their_places_in_the_scene(capsys, tmp_path):
+    rig = [*map(str, write_rig(tmp_path)), "--dof", "figure.tx=10"]
+    assert run(["info", *rig, "--joints"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"joint +name +parent +position\n", said)
+    # Moved by 10 along x; the arm is one unit from the root.
+    (root,) = re.findall(r"^ +0 +root +\((10), (0), (0)\)$", said, re.M)
+    (arm,) = re.findall(r"^ +1 +arm +root +\((.+), (.+), (.+)\)$", said, re.M)
+    offset = np.subtract(np.array(arm, dtype=float), np.array(root, dtype=float))
+    assert np.linalg.norm(offset) == pytest.approx(1.0, abs=2e-3)
+    assert run(["info", *map(str, write_rig(tmp_path))]) == 0
+    assert "parent" not in capsys.readouterr().out
+
+
 def test_tiny_rig_is_described_exactly(describe, tmp_path):
     described = describe(*write_rig(tmp_path))
     (actor,) = described["actors"]
@@ -32,6 +47,11 @@ def test_tiny_rig_is_described_exactly(describe, tmp_path):
     assert skeleton["joints"] == 2 and skeleton["roots"] == 1
     assert skeleton["dofs"] == 9 and skeleton["limited_dofs"] == 3 and skeleton["locked_dofs"] == 1
     assert [joint["parent"] for joint in skeleton["joint_table"]] == [-1, 0]
+    # Rz(0.3) Ry(0.5) Rx(0.25) turns the offset (0, 1, 0) of the arm.
+    sx, cx, sy, cy, sz, cz = (f(a) for a in (0.25, 0.5, 0.3) for f in (math.sin, math.cos))
+    arm = [cz * sy * sx - sz * cx, sz * sy * sx + cz * cx, cy * sx]
+    places = [joint["position"] for joint in skeleton["joint_table"]]
+    np.testing.assert_allclose(places, [[0, 0, 0], arm], atol=1e-12)
     assert skeleton["dof_table"][3:6] == [
         {"name": "root.x", "value": 0.25, "minimum": -1.0, "maximum": 1.0},
         {"name": "root.y", "value": 0.5, "minimum": 0.5, "maximum": 2.0},

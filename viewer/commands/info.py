@@ -26,6 +26,7 @@ from viewer.diagnostics import described
 from viewer.diagnostics.record import JsonObject, finite, note_values
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import Mesh, bounding_box, box_size, flat_triangles
 from viewer.rigs.number_text import number_text
@@ -39,7 +40,7 @@ from viewer.rigs.skeleton import (
     shown_joints,
     shown_parents,
 )
-from viewer.rigs.skinning import METHODS, PURE, Skinning
+from viewer.rigs.skinning import METHODS, PURE, Skinning, joint_matrices
 
 if TYPE_CHECKING:
     from viewer.rigs.blendshapes import BlendShapes
@@ -57,6 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "%(prog)s FILES ... [options]"
     add_scene_arguments(parser, default="")
     add_skinning_arguments(parser)
+    parser.add_argument(
+        "--joints",
+        action="store_true",
+        help="also print all joints: index, name, parent, and position in the scene as posed",
+    )
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
@@ -75,6 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for actor, parts in zip(scene.actors, found["actors"], strict=True):
             print("\n".join(_lines(parts) + _model_lines(parts["model"], actor.figure)))
+            if arguments.joints and "skeleton" in parts:
+                print("\n".join(_joint_lines(parts["skeleton"]["joint_table"], parts["size"])))
         for heading, text in found["captures"]:
             print(f"{heading}: {text}")
         if found["cameras"]:
@@ -109,7 +117,12 @@ def _describe_actor(actor: Actor, up: Up) -> JsonObject:
     parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
     parts["unit"] = scene_unit(Scene([actor])) or None
     if figure.skeleton is not None and actor.own_pose is not None:
-        parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.own_pose.dofs.tolist())
+        places = joint_matrices(figure, actor.own_pose)[:, :3, 3]
+        parts["skeleton"] = _describe_skeleton(
+            figure.skeleton,
+            actor.own_pose.dofs.tolist(),
+            apply_transform(actor.placement, places).tolist(),
+        )
     if figure.mesh is not None:
         parts["mesh"] = _describe_mesh(figure.mesh)
     if figure.skin is not None:
@@ -130,7 +143,10 @@ def _describe_actor(actor: Actor, up: Up) -> JsonObject:
     return parts
 
 
-def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> JsonObject:
+def _describe_skeleton(
+    skeleton: Skeleton, dofs: list[float], positions: list[list[float]]
+) -> JsonObject:
+    """Return the description of a skeleton in a pose; ``positions``: of its joints, scene space."""
     labels, shown = joint_labels(skeleton), shown_joints(skeleton).tolist()
     names, parents = skeleton.names, shown_parents(skeleton)
     limits = skeleton.dof_limits
@@ -146,6 +162,7 @@ def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> JsonObject:
                 "name": printable(names[joint]),
                 "label": labels[joint],
                 "parent": int(parents[joint]),
+                "position": positions[joint],
             }
             for joint in shown
         ],
@@ -257,10 +274,15 @@ def _box_text(actor: JsonObject) -> str:
     low, high = actor["box"]
     unit = f" {actor['unit']}" if actor["unit"] else ""
     size = actor["size"]
-    # Far from the origin, the corners of a small box have more digits.
-    finest = 10.0 ** (1 - _BOX_DIGITS + math.floor(math.log10(size))) if size > 0.0 else 0.0
+    finest = _finest(size)
     points = _point(low, finest), _point(high, finest)
     return f"{points[0]} to {points[1]}, size {rounded(size, _BOX_DIGITS)}{unit}"
+
+
+def _finest(size: float) -> float:
+    """Return the power of ten to which points of a box are rounded; 0 for all digits."""
+    # Far from the origin, the corners of a small box have more digits.
+    return 10.0 ** (1 - _BOX_DIGITS + math.floor(math.log10(size))) if size > 0.0 else 0.0
 
 
 def _skeleton_lines(skeleton: JsonObject) -> list[str]:
@@ -278,6 +300,25 @@ def _skeleton_lines(skeleton: JsonObject) -> list[str]:
         kind = "unlimited" if too_many else "0 and unlimited"
         lines.append(f"    {left_out} {more}are {kind} (--json lists all)")
     return lines
+
+
+def _joint_lines(joints: list[JsonObject], size: float | None) -> list[str]:
+    """Return a table of the joints, with positions as precise as the corners of the box."""
+    from viewer.commands._printing import table_lines
+
+    label = {joint["index"]: printable(joint["label"]) for joint in joints}
+    finest = _finest(size or 0.0)
+    rows = [["joint", "name", "parent", "position"]]
+    rows += [
+        [
+            str(joint["index"]),
+            label[joint["index"]],
+            label.get(joint["parent"], ""),
+            _point(joint["position"], finest),
+        ]
+        for joint in joints
+    ]
+    return [f"    {line}" for line in table_lines(rows, right=[0])]
 
 
 def _is_free(dof: JsonObject) -> bool:
