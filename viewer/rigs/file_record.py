@@ -12,6 +12,9 @@ from viewer.rigs.arrays import Floats, Ints
 Json: TypeAlias = dict[str, Any]
 """A JSON object that was parsed, or will be written."""
 
+GENERATOR = "viewer"
+"""Name by which glTF files state that this program wrote them."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredImage:

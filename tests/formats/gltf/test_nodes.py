@@ -284,6 +284,14 @@ def test_camera_is_written_below_its_joint(tmp_path, options):
     assert_allclose(center(view_in(scene.views[0], scene)), [-2, 4, 0], atol=1e-6)
 
 
+def test_node_around_a_figure_is_no_loss_of_files_of_this_program(tmp_path, capsys):
+    Path(tmp_path / "one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    first, again = str(tmp_path / "a.glb"), str(tmp_path / "b.glb")
+    assert run(["convert", str(tmp_path / "one.obj"), "-o", first]) == 0
+    assert run(["convert", first, "-o", again]) == 0
+    assert "not copied" not in capsys.readouterr().out
+
+
 def test_helper_nodes_that_are_not_written_are_named(tmp_path, capsys):
     file = skinned()
     file.root["nodes"] += [

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import RigError
 from viewer.media.image import media_type
-from viewer.rigs.file_record import Json
+from viewer.rigs.file_record import GENERATOR, Json
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 _TYPES = {
@@ -38,7 +38,7 @@ class Document:
     """Contents of a file; all objects are referred to by index."""
 
     def __init__(self, name: str) -> None:
-        self.root: Json = {"asset": {"version": "2.0", "generator": "viewer"}}
+        self.root: Json = {"asset": {"version": "2.0", "generator": GENERATOR}}
         self.extras: list[tuple[str, object]] = []
         """Name and application data of each figure whose file has some."""
         self.n_omitted = 0

@@ -30,7 +30,7 @@ from viewer.phrases import Remedy, agree, counted, listed, quoted, rounded
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
 from viewer.rigs.figure import Figure, FigureGroup, read_from
-from viewer.rigs.file_record import FileRecord, VrmRecord
+from viewer.rigs.file_record import GENERATOR, FileRecord, VrmRecord
 from viewer.rigs.hierarchy import path_to_root, with_ancestors
 from viewer.rigs.motion.transform_clip import Animation
 
@@ -120,6 +120,9 @@ def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tup
     kept = written | {node for members in groups for node in (*members.nodes, *members.meshes)}
     lost = [n for n in scene_order(file) if n not in kept and file.tree.cameras[n] < 0]
     extras = file.tree.extras
+    if file.asset.get("generator") == GENERATOR:
+        # The node around a figure has no data: writers of other files decide whether to have one.
+        lost = [n for n in lost if file.tree.parents[n] >= 0 or n in extras]
     return tuple(
         (file.tree.names[n] or f"node {n}") + (" (with extras)" if n in extras else "")
         for n in lost
