@@ -515,7 +515,7 @@ def test_small_holes_are_no_loops(monkeypatch):
 
 def test_sheets_and_several_objects_are_refused():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1.0]])
-    with pytest.raises(RigError, match="found a sheet without thickness; give it joints by --skel"):
+    with pytest.raises(RigError, match="found a sheet without thickness; --skeleton takes"):
         found((corners, np.array([[0, 1, 2], [0, 2, 3]])))
     one = beast()
     with pytest.raises(RigError, match="expected one object, found parts far from the largest"):

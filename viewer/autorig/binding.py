@@ -421,6 +421,9 @@ def _weight_lines(mesh: Welded, found: BoneWeights, method: str) -> Iterator[Dia
         yield note("R005.voxels: weights by distance from the bones through the solid")
         return
     sees = int((found.nearest >= 0).sum())
+    if sees == count:
+        yield note("R005.heat-all: all {all} vertices see a bone", all=count)
+        return
     yield note(
         "R005.heat: {n} of {all} vertices see a bone; the others take their weights from the "
         "surface around them",

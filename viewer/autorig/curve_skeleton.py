@@ -38,6 +38,7 @@ from viewer.rigs.mesh import Mesh
 from viewer.rigs.skeleton import ball_skeleton
 
 _FINEST = 160  # voxels along the longest side of thin meshes: legs of spiders
+_OWN_JOINTS = Remedy("Edit skeleton adds joints", "--skeleton takes a skeleton with joints there")
 # Fractions of the solid in an object that only touches the largest one: of one that is refused,
 # and of one that is reported. Smaller ones are ornaments.
 _OBJECT, _PART = 0.2, 0.05
@@ -160,8 +161,8 @@ def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
         )
     if found.has_loops:
         yield note(
-            "R016.more-loops: some loops are not cut: one side of each has no joints; "
-            "--skeleton takes a skeleton that has them"
+            "R016.more-loops: some loops are not cut: one side of each has no joints; {remedy}",
+            remedy=_OWN_JOINTS,
         )
     if found.missed > _MISSED:
         yield note(
@@ -172,7 +173,8 @@ def _lines(found: Joints, is_assumed: bool) -> Iterator[Diagnostic]:
     if len(found.thin):
         yield note(
             "R016.thin: without joints: {n}, {share:.0%} of the surface, the largest at {place}; "
-            "--skeleton takes a skeleton that has them",
+            "{remedy}",
+            remedy=_OWN_JOINTS,
             n=counted(len(found.thin), "thin part"),
             share=float(found.thin.sum()),
             place=listed([rounded(value) for value in found.thin_at[0].tolist()]),
@@ -232,8 +234,7 @@ def joints_in(
     tree = completed(solid, paths, rooted_tree(solid, paths, up), up, front, how.symmetry)
     if len(tree.chains) == 0 and float(paths.radii.max()) <= _THIN * solid.spacing:
         raise RigError(
-            "expected a solid with limbs, found a sheet without thickness; "
-            f"{Remedy('place its joints by Edit skeleton', 'give it joints by --skeleton')}"
+            f"expected a solid with limbs, found a sheet without thickness; {_OWN_JOINTS}"
         )
     report_fraction(0.8, "placing joints")
     if parts.count > 1:
