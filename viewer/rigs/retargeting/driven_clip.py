@@ -21,7 +21,11 @@ from viewer.rigs.retargeting.joint_matches import Matches, match_joints
 from viewer.rigs.retargeting.limb_hierarchy import limb_figure
 from viewer.rigs.retargeting.rest_alignment import rest_of
 from viewer.rigs.retargeting.retarget import retarget
-from viewer.rigs.retargeting.source_rest import with_source_rest, with_upright_rest
+from viewer.rigs.retargeting.source_rest import (
+    with_source_rest,
+    with_standing_rest,
+    with_upright_rest,
+)
 
 # Pairs of joints that show the left side of a body, the most certain first.
 _SIDES = ("hip", "shoulder", "knee", "collar", "elbow")
@@ -31,7 +35,7 @@ _SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of th
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
     limbs = limb_figure(figure)
-    body = figure if limbs is None else limbs.figure
+    body = with_standing_rest(figure if limbs is None else limbs.figure)
     chosen = drive.joint_map if limbs is None else limbs.renamed(drive.joint_map, figure)
     found = retarget(drive.motion, body, chosen, drive.source_rest)
     clip, notes = found.clip, found.notes

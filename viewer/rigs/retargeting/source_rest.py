@@ -16,6 +16,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import Remedy, listed
 from viewer.rigs.arrays import Bools, Floats
+from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import between
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import axis_vector
@@ -40,6 +41,8 @@ _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
 _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
 _UPRIGHT = np.cos(np.radians(40.0))  # maximum angle between the legs and an axis
+# The same for figures that are driven, whose bones may be fitted: a cosine, and an angle.
+_STANDING, _STANDING_ARMS = np.cos(np.radians(25.0)), np.radians(30.0)
 _ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pose
 _AXES = (
     "F007.rest-axes: rest pose of {motion}: a T-pose, in which its joint axes are parallel to the "
@@ -102,6 +105,34 @@ def with_source_rest(
         note = Diagnostic(key, values={**called, "remedy": _REMEDY})
         return _placed(motion, skeleton, found.rotations), [note]
     return _estimated(motion, skeleton, upright)
+
+
+def with_standing_rest(figure: Figure) -> Figure:
+    """Return a figure to drive, whose skeleton stands at rest if its joint axes tell how.
+
+    Meshes may be bound in any pose, such as scans of runners. If the joints' axes were parallel to
+    the body's in a T- or A-pose, that pose is the one without rotations.
+    """
+    skeleton = figure.require_skeleton()
+    still = rest_posture(skeleton, figure.up)
+    if still is None or _stands(still):
+        return figure
+    upright = replace(
+        skeleton, rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (skeleton.n_joints, 1))
+    )
+    found = rest_posture(upright, figure.up)
+    if found is None or _calibration(found)[0] < 0:
+        return figure
+    return replace(figure, skeleton=upright)
+
+
+def _stands(still: Postures) -> bool:
+    """Return whether a rest pose is about a T- or A-pose, with legs straight as a whole."""
+    # Knees of short legs may be anywhere between hip and ankle.
+    legs = [still.direction(f"{side}_hip", f"{side}_ankle")[0] for side in SIDES]
+    upright = [still.trunk()[0] @ still.up, *(leg @ -still.up for leg in legs)]
+    arms, _ = _arm_angles(still)
+    return min(upright) > _STANDING and float(np.max(arms)) < _STANDING_ARMS
 
 
 def with_upright_rest(motion: SkeletonMotion) -> SkeletonMotion:
@@ -206,20 +237,28 @@ def _calibration(postures: Postures) -> tuple[int, float]:
     """Return the row closest to a T- or A-pose, -1 if none is, and how far its arms are lowered."""
     left, up, forward = postures.left(), postures.up, postures.forward()
     angles = [_angles(postures.trunk(), up)]
-    drops = []
-    for name, sign in zip(SIDES, (1.0, -1.0), strict=True):
+    for name in SIDES:
         angles += [_angles(bone, -up) for bone in _bones(postures, name, "hip knee ankle")]
+    arms, drops = _arm_angles(postures)
+    largest = np.max([*angles, *arms], axis=0)
+    largest[_is_rolled(postures, left, forward)] = np.inf
+    best = int(largest.argmin())
+    row = int(postures.rows[best]) if largest[best] < _NEAR else -1
+    return row, float(np.mean(drops, axis=0)[best])
+
+
+def _arm_angles(postures: Postures) -> tuple[list[Floats], list[Floats]]:
+    """Return angles (F,) of the bones of arms to the nearest T- or A-pose, and its own angles."""
+    left, up = postures.left(), postures.up
+    angles, drops = list[Floats](), list[Floats]()
+    for name, sign in zip(SIDES, (1.0, -1.0), strict=True):
         arms = _bones(postures, name, "shoulder elbow wrist")
         outward = np.einsum("fa,fa->f", arms[0], sign * left)
         drop = np.clip(np.arctan2(-arms[0] @ up, outward), 0.0, _A_POSE)
         wanted = np.cos(drop)[:, None] * sign * left - np.sin(drop)[:, None] * up
         angles += [_angles(bone, wanted) for bone in arms]
         drops.append(drop)
-    largest = np.max(angles, axis=0)
-    largest[_is_rolled(postures, left, forward)] = np.inf
-    best = int(largest.argmin())
-    row = int(postures.rows[best]) if largest[best] < _NEAR else -1
-    return row, float(np.mean(drops, axis=0)[best])
+    return angles, drops
 
 
 def _is_rolled(postures: Postures, left: Floats, forward: Floats) -> Bools:
