@@ -41,8 +41,10 @@ _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
 _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
 _UPRIGHT = np.cos(np.radians(40.0))  # maximum angle between the legs and an axis
-# The same for figures that are driven, whose bones may be fitted: a cosine, and an angle.
-_STANDING, _STANDING_ARMS = np.cos(np.radians(25.0)), np.radians(30.0)
+# Limits of a figure that is driven, whose bones may be fitted to a mesh: a cosine, and an angle.
+# Within them, head, hands and feet of a mesh are held as in a T- or A-pose; short bones of a fitted
+# skeleton may be 50 degrees off in the pose without rotations.
+_STANDING, _STANDING_ARMS = np.cos(np.radians(35.0)), np.radians(60.0)
 _ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pose
 _AXES = (
     "F007.rest-axes: rest pose of {motion}: a T-pose, in which its joint axes are parallel to the "
