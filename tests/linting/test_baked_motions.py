@@ -148,6 +148,11 @@ def test_bones_of_a_hand_without_a_wrist_branch_off_at_the_elbow():
     assert lengths_of((*trunk, *arm, *fingers), 5, parents) == []
 
 
+def test_head_on_a_chest_with_shoulders_has_a_bone():
+    names = ("Hips", "Spine", "Chest", "Head", "LeftArm", "LeftForeArm", "RightArm", "RightForeArm")
+    assert lengths_of(names, 3, (-1, 0, 1, 2, 2, 4, 2, 6)) == ["C022"]
+
+
 def test_quick_swing_of_a_capture_is_no_jitter():
     # A swing of 200 mm in six frames: fourth differences of 0.2 (2 - 2 cos 60°)^2 = 0.2 m, which
     # correlate by cos 60°; those of noise correlate by -0.8.

@@ -106,6 +106,21 @@ def test_modelled_character_that_stands_in_the_ground_throughout_is_found(depth)
     assert all(one.diagnostic.values["depth"] == "100 mm" for one in found)
 
 
+@pytest.mark.parametrize(("depth", "key"), [(0.1, "C013.no-height"), (0.3, "C008.throughout")])
+def test_character_that_never_rests_is_in_the_ground_if_it_is_in_nearly_all_frames(depth, key):
+    # It bobs by 0.1 m, so that its feet are up to 0.2 m below their lowest places, on no ground.
+    figure, times = viewer.load(bundled_body()).actors[0].figure, _K / RATE
+    heights = 0.1 * np.sin(2.0 * np.pi * 3.0 * times) - depth
+    keys = figure.skeleton.rest_translations[0] + along(1, heights)
+    channel = TransformChannel(0, "translation", times, keys)
+    actor = Actor(figure, clip=TransformClip("keys", (channel,), 0.0, float(times[-1])))
+    (found,) = check_feet(Subject(actor))
+    assert found.diagnostic.key == key
+    if depth == 0.3:  # nine tenths of a sine are below sin 72°
+        expected = 0.3 - 0.1 * np.sin(np.radians(72.0))
+        assert found.diagnostic.values["depth"] == f"{1000 * expected:.0f} mm"
+
+
 def test_notes_about_several_animations_are_one_line():
     """The figure plays two animations with a dip of one foot."""
     figure = legs()

@@ -50,6 +50,7 @@ _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of t
 # Floors of whole motions, as fractions of the figure's height
 _BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
 _LOW_FLOOR, _OTHER_FLOOR = 0.06, 0.25  # depths between which the floor of a capture is too low
+_NEARLY_ALL = 0.9  # fraction of the frames: a jump may begin and end on the ground
 _TOUCHING = 0.3  # minimum fraction of frames in which a foot is on the ground
 _HOPS = 0.8  # seconds; a hop or dodge takes less
 _RARELY = 0.1  # fraction of these frames in which the feet of a body that glides may be slow
@@ -94,7 +95,10 @@ def check(subject: Subject) -> Iterator[Finding]:
         stance = Actor(track.stance, placement=subject.actor.placement)
         found = ground_under(stance, subject.up, heights, track.present, step)
         if found.height is None:
-            yield _unsure(subject, found, step)
+            # Feet that are below the ground in nearly all frames are so wherever they rest.
+            highest = float(np.quantile(heights.min(axis=1)[track.present], _NEARLY_ALL))
+            sunk = [*_sunk_throughout(subject, track, highest, height)]
+            yield from sunk or [_unsure(subject, found, step)]
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
         yield from _sunk_throughout(subject, track, ground, height)
@@ -217,7 +221,7 @@ def _sunk_throughout(
     if not least * size < depth < most * size:
         return
     yield subject.found(
-        "C008.throughout: feet rest {depth} below the ground in the whole motion",
+        "C008.throughout: feet are {depth} below the ground in the whole motion",
         depth=subject.length(depth / track.scale),
         part="clip",
         joints=track.feet,

@@ -69,7 +69,7 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
 
     Its length is the distance to a parent that has a parent and no second branch: a shoulder on
     the chest and a foot below the root (as IK controls are) have no bone of their own. The bones of
-    a hand without a wrist branch off at the elbow.
+    a hand without a wrist branch off at the elbow, and neck and head at a chest with shoulders.
     """
     parents = skeleton.parents
     n_below = np.zeros(len(parents), dtype=np.int64)
@@ -77,9 +77,12 @@ def _chain_bones(figure: Figure, skeleton: Skeleton) -> Bools:
     branches = np.zeros(len(parents), dtype=np.int64)
     np.add.at(branches, parents[(parents >= 0) & (n_below > 0)], 1)
     above = np.where(parents >= 0, parents, 0)
-    bends = np.array([each.endswith(("_elbow", "_knee")) for each in joint_meanings(skeleton)])
-    bones: Bools = (parents >= 0) & (parents[above] >= 0) & ((branches[above] <= 1) | bends[above])
-    bones &= (n_below > 0) | (n_below[above] == 1)
+    meanings = joint_meanings(skeleton)
+    bends = np.array([each.endswith(("_elbow", "_knee")) for each in meanings])
+    is_head = np.isin(meanings, ("neck", "head"))
+    own = (branches[above] <= 1) | bends[above] | is_head
+    bones: Bools = (parents >= 0) & (parents[above] >= 0) & own
+    bones &= (n_below > 0) | (n_below[above] == 1) | is_head
     if figure.skin is not None and figure.is_attached:
         moves = moves_vertices(figure.skin)
         bones &= moves & moves[above]
