@@ -59,7 +59,7 @@ def test_workers_that_crash_hang_or_exhaust_memory_affect_no_other_item(tmp_path
     status["raise"] = "failed"
     for name in status:
         (tmp_path / "in" / f"{name}.txt").write_text("1")
-    limits = {"workers": 2, "retries": 1, "timeout": 0.4, "memory": 600 << 20}
+    limits = {"workers": 2, "retries": 1, "timeout": 1.0, "memory": 600 << 20}
     report = viewer.batch("in/*.txt", misbehave, "out", to="sum", **limits)
     assert sorted(one.item.index for one in report.results) == list(range(105))
     by_name = {Path(one.item.name).stem: one for one in report.results}

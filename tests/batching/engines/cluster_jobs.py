@@ -26,6 +26,9 @@ class Job:
             with Path(item.output).open("a") as file:
                 file.write(f"{os.getpid()}\n")
         if item.name == "crash":
+            # A worker reports the end of a task some milliseconds later. If it crashed before, it
+            # would seem to have been running the task before this one.
+            time.sleep(0.2)
             os._exit(3)
         if item.name == "killed" and len(Path(item.output).read_text().split()) == 1:
             half_written(item.output).touch()
