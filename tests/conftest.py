@@ -30,8 +30,9 @@ DRAWING = (
     "viewer/commands/_pictures.py",
     "viewer/rendering/",
 )
-# These tests mostly wait. If they started last, one worker would finish long after the others.
-FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
+# These tests mostly wait. If they started last, one worker would finish long after the others; if
+# several workers waited at the same time, a core would be idle.
+FIRST = ("tests/batching/engines/", "tests/test_interrupts.py", "tests/test_window.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
