@@ -18,6 +18,14 @@ def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("viewer.models._settings_file", lambda: settings)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _lasting_notes():
+    """Show messages until a test ends, however long it takes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("viewer.app.core.messages._NOTE_SECONDS", 1e6)
+        yield
+
+
 @pytest.fixture
 def drive():
     """Open apps and close them after the test."""
