@@ -54,7 +54,7 @@ def test_large_images_are_decoded_while_the_caller_works(monkeypatch):
 
     monkeypatch.setattr(image, "_decoded", observed)
     with decoding_pictures([file(1), file(2)]) as finish:
-        assert begun.wait(10.0)
+        assert begun.wait(60.0)
         assert [pixels[0, 0, 0] for pixels in finish()] == [1, 2]
 
 

@@ -276,7 +276,7 @@ def test_other_scenes_may_be_rendered_between_steps(offscreen, scene):
 def test_few_frames_are_queued_for_a_slow_sink(offscreen, scene):
     class Slow(Kept):
         def write(self, frame, pixels):
-            gate.wait(10)
+            gate.wait(60)
             super().write(frame, pixels)
 
     gate, sink = threading.Event(), Slow()
@@ -316,7 +316,7 @@ def test_memory_holds_a_frame_per_worker_and_two_more(offscreen, scene, monkeypa
 
     class Slow(Kept):
         def write(self, frame, pixels):
-            assert full.wait(10)
+            assert full.wait(60)
             time.sleep(0.02)
             if not np.shares_memory(pixels, given[frame]):
                 foreign.append(frame)

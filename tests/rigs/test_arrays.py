@@ -135,12 +135,12 @@ def test_threads_that_evict_results_of_other_threads_get_correct_results():
 
     def slow() -> str:
         inside.set()
-        go.wait(10)
+        go.wait(60)
         return "slow"
 
     thread = threading.Thread(target=lambda: found.append(memo.get(owner, "slow", slow)))
     thread.start()
-    inside.wait(10)
+    inside.wait(60)
     assert memo.get(owner, "quick", lambda: "quick") == "quick"
     go.set()
     thread.join()

@@ -254,11 +254,11 @@ def test_job_reports_progress_and_result():
     def act() -> list[str]:
         report(2, 5, "steps", "weights")
         reached.set()
-        go.wait(10)
+        go.wait(60)
         return ["done"]
 
     job = ThreadJob("Checking", act)
-    reached.wait(10)
+    reached.wait(60)
     assert (job.progress, job.title, job.is_done) == ((2, 5, "steps"), "weights", False)
     go.set()
     job.wait()
@@ -281,13 +281,13 @@ def test_cancelled_job_ends_before_its_next_step_and_is_done_once_its_thread_has
     def act() -> list[str]:
         report(0, 2, what="first")
         reached.set()
-        go.wait(10)
+        go.wait(60)
         report(1, 2, what="second")
         after.append(1)
         return ["never"]
 
     job = ThreadJob("Checking", act)
-    reached.wait(10)
+    reached.wait(60)
     job.cancel()
     assert job.is_cancelled and not job.is_done
     go.set()

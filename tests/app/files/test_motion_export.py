@@ -96,7 +96,7 @@ def test_cancelled_export_keeps_the_existing_file(moving, tmp_path, monkeypatch)
 
     monkeypatch.setattr(motion_export, "export", export)
     gate = threading.Event()
-    monkeypatch.setattr(motion_export, "sampled", lambda *_: gate.wait(10))
+    monkeypatch.setattr(motion_export, "sampled", lambda *_: gate.wait(60))
     save_motion(moving.state, path)
     gate.set()
     moving.finish_job()

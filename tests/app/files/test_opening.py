@@ -164,7 +164,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     gate = threading.Event()
 
     def slow(paths, **_):
-        gate.wait(10)
+        gate.wait(60)
         return read_files(paths)
 
     monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
@@ -189,7 +189,7 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
     monkeypatch.setattr(
         viewer.app.files.files,
         "read_files",
-        lambda paths, **_: (gate.wait(10), read_files(paths))[1],
+        lambda paths, **_: (gate.wait(60), read_files(paths))[1],
     )
     open_files(hand.state, list(rig))
     loader = hand.state.of(Files).loader
@@ -215,7 +215,7 @@ def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig,
     monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
     open_files(hand.state, list(rig))
     loader = hand.state.of(Files).loader
-    assert begun.wait(10)
+    assert begun.wait(60)
     loader._started -= 5.0
     hand.step(2)
     assert loader.progress[1:] == (430, "MB")
@@ -508,7 +508,7 @@ def test_errors_are_raised_by_the_result():
         raise ViewerError("a.bvh: cut short")
 
     began = Opening("a.bvh", act)
-    assert began.wait(10.0)
+    assert began.wait(60.0)
     with pytest.raises(ViewerError, match="cut short"):
         began.result()
 
@@ -523,7 +523,7 @@ def test_work_is_cancelled_at_its_next_report():
         report(4, 5, "MB")
 
     began = Opening("a.bvh", act)
-    assert reported.wait(10.0) and began.progress == (3, 5, "MB")
+    assert reported.wait(60.0) and began.progress == (3, 5, "MB")
     assert not began.wait(0.0)
     began.cancel()
     goes_on.set()

@@ -1,5 +1,6 @@
 """The timeline with mouse and keys: play, step, scrub, range, tracks, and captures being read."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -225,14 +226,14 @@ def test_escape_cancels_loading_and_keeps_loaded_frames(streaming, monkeypatch):
         for part in whole.parts():
             yield part
             if part.stop >= 10:
-                gate.wait(10)
+                gate.wait(60)
 
     slow = Capture("slow", 100, 0, parts, up="y")
     streaming.start(slow)
-    for _ in range(200):
+    deadline = time.monotonic() + 60.0
+    while streaming.state.scene.actors[0].clip.n_rows < 10:
+        assert time.monotonic() < deadline
         streaming.step(1)
-        if streaming.state.scene.actors[0].clip.n_rows == 10:
-            break
         streaming.state.of(Files).stream._thread.join(0.005)
     assert "Cancel reading" in streaming.state.item_rects
     streaming.key("escape")
