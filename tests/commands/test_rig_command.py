@@ -154,6 +154,27 @@ def test_missing_frame_is_refused_by_option_name(tmp_path, capsys, option):
     assert capsys.readouterr().err == f"viewer: {option}: expected 0 to 4, found 9\n"
 
 
+@pytest.mark.parametrize(
+    ("head", "is_told"),
+    [("0 3.9 0", False), ("0 4.3 0", False), ("0 0.1 3.9", True)],
+    ids=["inside", "at the surface", "z up"],
+)
+def test_landmarks_with_other_axes_than_the_mesh_are_a_warning(
+    tmp_path, capsys, seen, head, is_told
+):
+    # A box from (-1, 0, -0.5) to (1, 4, 0.5).
+    corners = [(x, y, z) for x in (-1, 1) for y in (0, 4) for z in (-0.5, 0.5)]
+    rows = [f"v {x} {y} {z}" for x, y, z in corners]
+    (tmp_path / "box.obj").write_text("\n".join([*rows, "f 1 2 4 3", "f 5 7 8 6", ""]))
+    (tmp_path / "marks.txt").write_text(f"head {head}\npelvis 0 2 0\nneck 0 3 0\n")
+    marks = ["--landmarks", str(tmp_path / "marks.txt")]
+    assert run(["rig", str(tmp_path / "box.obj"), *marks]) == 130
+    said = capsys.readouterr().err
+    told = "1 landmark of 3 outside the box of the mesh, (-1, 0, -0.5) to (1, 4, 0.5), the first at"
+    assert (f"{told} (0, 0.1, 3.9)" in said) == is_told, said
+    assert ("outside the box" in said) == is_told
+
+
 def test_options_reach_the_transfer(folder, tmp_path, capsys, seen):
     pairs = tmp_path / "pairs.txt"
     pairs.write_text("head 1 2 3\njaw 4 5 6  # there\n\n0 0 0 7 8 9\n")

@@ -58,11 +58,11 @@ from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.loading.mesh_sequence import ARCHIVES, SEQUENCES, read_mesh_sequence, stores_frames
 from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
-from viewer.phrases import counted, printable, rounded
+from viewer.phrases import counted, listed, printable, rounded
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
-from viewer.rigs.geometry.vectors import Up
+from viewer.rigs.mesh import bounding_box
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.moving_mesh import (
     MovingMesh,
@@ -78,6 +78,7 @@ from viewer.rigs.skinning import joint_matrices, posed_mesh
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 # Landmarks.
+_FAR = 0.1  # distance from the mesh's box, relative to its longest side, that is a warning
 _LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
 
 
@@ -210,7 +211,7 @@ def run(arguments: argparse.Namespace) -> int:
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
-    settings = _settings(arguments, template, output, target.up)
+    settings = _settings(arguments, template, output, target)
     clips = _read_clips(arguments.clips, output, template_files, template.figure, frames.fps)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
@@ -298,7 +299,7 @@ def rig(
         pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
         _name_template_frame(arguments, frames)
         _, actor, found = _asked_template(arguments, figure, pose, frames, inputs)
-        settings = _settings(arguments, actor, None, figure.up)
+        settings = _settings(arguments, actor, None, figure)
         rigged = _transferred(figure, actor, settings, found)
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
     return Scene([result], (*said.found, *rigged.lines), world_up=rigged.figure.up, files=inputs)
@@ -599,19 +600,20 @@ def _template_files(name: str) -> list[Path]:
 
 
 def _settings(
-    arguments: argparse.Namespace, template: Actor, output: Path | None, target_up: Up
+    arguments: argparse.Namespace, template: Actor, output: Path | None, target: Figure
 ) -> TransferSettings:
     """Return the requested settings; the .skel format cannot store correctives."""
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)
         landmarks = read_landmarks(source, template.figure, template.pose)
+        print_warnings(_far_landmarks(source, landmarks[:, 1], target))
     if arguments.smooth < 0:
         raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
     # A skeleton found in the mesh is where it should be.
     alignment = AlignmentSettings(matrix=np.eye(4))
     if not arguments.auto:
-        up = arguments.up or stated_up(target_up)
+        up = arguments.up or stated_up(target.up)
         alignment = settings_of(AlignmentSettings, arguments, landmarks=landmarks, up=up)
     settings = settings_of(
         TransferSettings,
@@ -670,6 +672,35 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
             other=rounded(other),
         )
     return points
+
+
+def _far_landmarks(source: Source, places: Floats, target: Figure) -> list[Diagnostic]:
+    """Return a warning if positions (N, 3) are outside the mesh's box: they may have other axes."""
+    box = bounding_box(target.require_mesh().positions)
+    away = np.maximum(box[0] - places, places - box[1]).max(axis=1)
+    far = np.flatnonzero(away > _FAR * (box[1] - box[0]).max())
+    if not len(far):
+        return []
+    values = {
+        "n": counted(len(far), "landmark"),
+        "all": len(places),
+        "low": _point_text(box[0]),
+        "high": _point_text(box[1]),
+        "found": _point_text(places[far[0]]),
+    }
+    return [
+        Diagnostic(
+            "R009.landmarks: {n} of {all} outside the box of the mesh, {low} to {high}, the first "
+            "at {found}; coordinates are those of viewer info, after the rotations of the file's "
+            "nodes",
+            source.path,
+            values=values,
+        )
+    ]
+
+
+def _point_text(point: Floats) -> str:
+    return f"({listed([rounded(value) for value in point.tolist()])})"
 
 
 def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:

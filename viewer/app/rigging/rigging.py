@@ -412,7 +412,10 @@ def no_target(state: AppState) -> str:
     """Return the reason why there is nothing to rig."""
     if state.of(Rigging).target is not None:
         return ""
-    return f"every mesh in the scene has a rig: add a mesh without one, {one_of(MESHES)}"
+    return (
+        "every mesh in the scene has a rig: change it by Edit skeleton, or add a mesh without one, "
+        f"{one_of(MESHES)}"
+    )
 
 
 def is_intact(result: Result) -> bool:
