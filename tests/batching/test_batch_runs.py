@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 from dataclasses import replace
 from itertools import count
@@ -456,6 +457,26 @@ def test_workers_receive_few_items_and_stop_on_request():
         finished.append(result)
     assert all(one.status == "done" for one in finished)
     assert 5 <= len(finished) <= next(taken) <= 5 + IN_FLIGHT
+
+
+@pytest.mark.slow
+def test_worker_may_end_before_its_last_message_is_read(monkeypatch):
+    pool = pytest.importorskip("pebble.pool.process").PoolManager
+    read = pool.process_next_message
+
+    def read_late(manager, timeout):
+        if manager.worker_manager.pool_channel.poll(timeout):
+            time.sleep(0.3)  # three times as long as the other thread sleeps
+            read(manager, 0.0)
+
+    monkeypatch.setattr(pool, "process_next_message", read_late)
+    monkeypatch.setattr("viewer.batching.engines.processes._LAST_WORDS", 2.0)
+    items = items_called("crash.txt", "a")
+    found = load_engine("processes").run(items, JOB, Limits(workers=1, retries=0))
+    assert {one.item.name: (one.status, one.message) for one in found} == {
+        "crash.txt": ("crashed", "the worker process exited with 3"),
+        "a": ("done", ""),
+    }
 
 
 @pytest.fixture

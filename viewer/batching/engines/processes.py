@@ -40,6 +40,7 @@ _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit
 _PATIENCE = 120.0  # seconds until a pool without a running item is replaced; doubled each time
 _MOST_BREAKS = 3  # maximum number of pools that end without a result before the batch fails
+_LAST_WORDS = 0.5  # seconds in which the messages of a worker that has ended are read
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -98,6 +99,25 @@ class _Worker(SpawnProcess):
     """A worker process that refuses to start while its pool is closing."""
 
     owner: _Context | None = None
+    _ended: float | None = None
+    """When it was first found to have ended: monotonic seconds."""
+    _is_dismissed = False
+
+    def is_alive(self) -> bool:
+        """Return whether it runs, or has just ended by itself."""
+        # One thread of the pool looks for ended workers, and another one reads their messages. If a
+        # worker crashed right after it took an item, and were found before this message is read,
+        # the pool would break, or wait for the item without end.
+        if super().is_alive():
+            return True
+        now = time.monotonic()
+        self._ended = now if self._ended is None else self._ended
+        return not self._is_dismissed and now < self._ended + _LAST_WORDS
+
+    def terminate(self) -> None:
+        """End the process, whose messages no longer matter."""
+        self._is_dismissed = True
+        super().terminate()
 
     def start(self) -> None:
         """Start the process; raise OSError if the pool is closing, which ends the pool's thread."""
