@@ -48,6 +48,7 @@ def test_time_poses_a_copy():
         ({"shading": "nonsense"}, "^shading: no value .*phong, pbr"),
         ({"shading": 3}, '^shading: expected "auto" or "phong" or .*, found int'),
         ({"wire": True}, "^render: no option is called wire; did you mean .*allowed: background"),
+        ({"sizes": (9, 9)}, "^render: no option is called sizes; did you mean size"),
         ({"wireframe": "yes"}, "^wireframe: expected True or False, found str"),
         ({"metallic": 2}, "^metallic: expected 0 to 1, found 2"),
         ({"isolines": 3}, "^isolines: expected True or False or None, found int"),
@@ -72,7 +73,7 @@ def test_every_display_option_is_a_keyword_of_the_same_effect():
     scene, options = viewer.load(), viewer.DisplayOptions(quality="normal")
     for each in dataclasses.fields(options):
         value = getattr(options, each.name)
-        assert display_options("render", None, {each.name: value}) in (
+        assert display_options(viewer.render, None, {each.name: value}) in (
             options,
             dataclasses.replace(options, shading="scalar"),
         )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
@@ -99,7 +100,7 @@ def render(
     (48, 64, 4)
     """
     settings |= {"background": background, "quality": quality, "scalar": scalar}
-    scene, shown = scene_of(scene, "render"), display_options("render", options, settings)
+    scene, shown = scene_of(scene, "render"), display_options(render, options, settings)
     _check_types(size, distance, azimuth, inclination, look_at, orthographic)
     check_type("camera", camera, Camera, NoneType)
     if time is not None:
@@ -181,7 +182,7 @@ def video(
     from viewer.commands.render import Drawing, complete, draw_sequence
 
     settings |= {"background": background, "quality": quality, "scalar": scalar}
-    scene, shown = scene_of(scene, "video"), display_options("video", options, settings)
+    scene, shown = scene_of(scene, "video"), display_options(video, options, settings)
     _check_types(size, distance, azimuth, inclination, look_at, orthographic)
     check_type("path", path, str, Path)
     check_type("frames", frames, range, NoneType)
@@ -258,7 +259,9 @@ def scene_at(scene: Scene, time: float) -> Scene:
 
 
 def display_options(
-    function: str, options: DisplayOptions | None, settings: Mapping[str, object]
+    function: Callable[..., object],
+    options: DisplayOptions | None,
+    settings: Mapping[str, object],
 ) -> DisplayOptions:
     """Return a copy of display options with the settings that are not None, all checked.
 
@@ -269,9 +272,10 @@ def display_options(
     known = [each.name for each in dataclasses.fields(DisplayOptions)]
     for name, value in settings.items():
         if name not in known:
-            near = did_you_mean(name, known)
+            own = inspect.signature(function).parameters
+            near = did_you_mean(name, [*own, *known])
             raise ViewerError(
-                f"{function}: no option is called {printable(name, 60)}; "
+                f"{function.__name__}: no option is called {printable(name, 60)}; "
                 f"{f'{near} ' if near else ''}allowed: {all_of(sorted(known))}"
             )
         if value is not None:
