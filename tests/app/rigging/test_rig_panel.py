@@ -129,10 +129,13 @@ def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
     hand = rigging(placed=False)
     corner = hand.state.scene.actors[0].figure.mesh.positions[0]
     places = corner + np.outer([0.0, 4.0, 8.0], [0.0, 1.0, 0.0])
-    gate = threading.Event()
+    gate, chosen = threading.Event(), threading.Event()
+    parents = np.array([-1, 0, 1], np.int32)
 
     def fitting(*_):
-        offer(FittedJoints(places, np.array([-1, 0, 1], np.int32)))
+        offer(FittedJoints(places, parents))
+        chosen.wait()
+        offer(FittedJoints(places, parents, is_chosen=True))
         while not gate.wait(0.005):
             report(3, 10, "", "fitting limbs")
         raise AssertionError("the job is cancelled before")
@@ -141,7 +144,12 @@ def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
     hand.step(2)
     before = hand.app.pixels()
     hand.click("Align")
-    while hand.state.job.found is None or hand.state.job.title == "Aligning":
+    while hand.state.job.found is None:
+        hand.step()
+    hand.step(2)
+    tried = hand.app.pixels()
+    chosen.set()
+    while not hand.state.job.found.is_chosen or hand.state.job.title == "Aligning":
         hand.step()
     hand.step(2)
     assert hand.state.job.title == "Aligning: fitting limbs"
@@ -151,6 +159,10 @@ def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
         x, y = np.array(view_frame(hand.state).place(place)) * scale
         assert changed[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].any()
     shown = hand.app.pixels()
+    # A fit that is only tried is fainter.
+    x, y = np.rint(np.array(view_frame(hand.state).place(places[1])) * scale).astype(int)
+    faint, full = (np.abs(each[y, x].astype(int) - before[y, x]).sum() for each in (tried, shown))
+    assert 0 < faint < 0.6 * full
     target = hand.state.scene.actors.pop(0)
     hand.step(2)
     gone = hand.app.pixels()

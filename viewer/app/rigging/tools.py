@@ -51,6 +51,7 @@ from viewer.rigs.geometry.transform import apply_transform, translation_matrix
 from viewer.rigs.mesh import Mesh, bounding_box
 
 _TEMPLATE_INK, _TARGET_INK = (0.35, 0.70, 1.0, 1.0), (1.0, 0.75, 0.30, 1.0)
+_TRIED_INK = (0.35, 0.70, 1.0, 0.35)  # joints of a fit that is only tried
 _RIM = (0.0, 0.0, 0.0, 0.8)
 _DOT = 5.0  # radius, window coordinates
 RADIUS = 80.0
@@ -150,11 +151,12 @@ def _draw_found(state: AppState) -> None:
         return  # another file was opened meanwhile, or the target was removed
     pen = Pen(view_frame(state))
     places = apply_transform(target_place(running.target), found.places)
+    ink = _TEMPLATE_INK if found.is_chosen else _TRIED_INK
     pen.list.push_clip_rect((x, y), (x + width, y + height), True)
     for joint, parent in enumerate(found.parents.tolist()):
         if parent >= 0:
-            pen.line(places[[parent, joint]], _TEMPLATE_INK, 2.0)
-        pen.dot(places[joint], 3.0, _TEMPLATE_INK)
+            pen.line(places[[parent, joint]], ink, 2.0)
+        pen.dot(places[joint], 3.0, ink)
     pen.list.pop_clip_rect()
 
 

@@ -34,6 +34,7 @@ from viewer.app.rigging.rigging import (
 )
 from viewer.autorig.alignment.anatomy_fit import left_of
 from viewer.autorig.alignment.orientation_search import axis_direction, nearest_axis
+from viewer.autorig.alignment.pose_fit import FittedJoints
 from viewer.autorig.alignment.posed_alignment import PosedAlignment, align_posed
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.alignment.surface_alignment import (
@@ -58,7 +59,7 @@ from viewer.loading import load
 from viewer.loading.mesh_sequence import ARCHIVES, SEQUENCES, read_mesh_sequence, stores_frames
 from viewer.loading.placing import placed_like
 from viewer.phrases import counted, one_of, printable
-from viewer.progress import part_of_work, report
+from viewer.progress import offer, part_of_work, report
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
@@ -468,6 +469,9 @@ def align_template(
     """Align a template with a target; raises ``RigError`` as ``align`` does."""
     figure, plain = _unshaped(template)
     found = align_posed(figure, plain, target, settings, fits)
+    joints = joint_matrices(found.figure, found.pose)[:, :3, 3]
+    parents = found.figure.require_skeleton().parents
+    offer(FittedJoints(found.alignment.similarity.apply(joints), parents, is_chosen=True))
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
 
     def placed(fit: PosedAlignment) -> Placing:

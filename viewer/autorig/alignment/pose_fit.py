@@ -274,6 +274,8 @@ class FittedJoints:
     places: Floats
     """(J, 3). In the target's frame."""
     parents: Ints
+    is_chosen: bool = False
+    """Whether this is the fit that is kept; others are tried, and may be far from the target."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -199,7 +199,7 @@ def align(
     settings: AlignmentSettings,
 ) -> Alignment:
     """Find the similarity that aligns the template with the target."""
-    report_fraction(0.0, "aligning the template")
+    report_fraction(0.0, "matching the surfaces")
     samples = settings.samples
     ours, theirs = fine = _surface(template, samples), _surface(target, samples)
     if settings.matrix is not None:
@@ -212,7 +212,7 @@ def align(
     if settings.landmarks is not None:
         start = fit_similarity(settings.landmarks[:, 0], settings.landmarks[:, 1], scale)
         if settings.refines:
-            report_fraction(0.2, "aligning the template")
+            report_fraction(0.2, "matching the surfaces")
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
         return Alignment.of(ours, theirs, _refined(fine, start, settings), "landmarks")
     # A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
@@ -221,7 +221,7 @@ def align(
     # points; the best is refined on the surfaces.
     rotations = axis_rotations(template_up, settings.up, settings.facing)
     stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
-    report_fraction(0.1, "aligning the template")
+    report_fraction(0.1, "matching the surfaces")
     if stays.error <= _SURELY:
         return Alignment.of(ours, theirs, stays.similarity, "in place")
     # A figure with other proportions may fit best upside down: only a mesh that coincides with the
@@ -256,7 +256,7 @@ def _refined(
     settings: AlignmentSettings,
 ) -> Similarity:
     if settings.refines:
-        report_fraction(0.85, "aligning the template")
+        report_fraction(0.85, "matching the surfaces")
         start = slide(fine[0], fine[1], start, _SLIDES, settings.scale != "none")
     if settings.scale == "axes":
         return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS, settings.refines)
