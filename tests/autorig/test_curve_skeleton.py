@@ -295,6 +295,52 @@ def test_trunk_between_two_limbs_has_the_root_if_it_is_thicker(monkeypatch):
     assert snake["root"][2] < 0.4
 
 
+@pytest.mark.parametrize("voxels", [64, 71])
+def test_posts_on_a_foot_mirror_each_other_and_the_root_is_between_them(monkeypatch, voxels):
+    resolution(monkeypatch, voxels)
+    foot = box((-1.5, 0, -0.3), (1.5, 0.3, 0.3))
+    posts = [pipe([(x, 0.2, 0), (x, 2.0, 0)], 0.12, around=16) for x in (-1.2, 1.2)]
+    joints = joints_of(found(united(foot, *posts)).figure.skeleton)
+    assert_allclose(joints["root"], [0.0, 0.15, 0.0], atol=0.15)
+    left = {name: place for name, place in joints.items() if name.endswith(("left", "left_end"))}
+    assert left
+    for name, place in left.items():
+        assert_allclose(place * [-1, 1, 1], joints[name.replace("left", "right")], atol=0.1)
+
+
+@pytest.mark.parametrize("voxels", [80, 88])
+def test_arms_of_a_kind_have_as_many_joints(monkeypatch, voxels):
+    resolution(monkeypatch, voxels)
+    # Two bends of 21 and 29 degrees, or one of 38 in their place: voxels decide for a single arm.
+    head = pipe([(0, 0.9, 0), (0, 1.1, 0)], 0.5, around=16)
+    way = [(0.3, 0.7, 0.0), (0.7, 0.35, 0.05), (1.2, 0.15, 0.15), (1.8, 0.2, 0.3)]
+    arms = []
+    for angle in 2 * np.pi * (np.arange(8) + 0.5) / 8:
+        corners = [(r * np.cos(angle + more), y, r * np.sin(angle + more)) for r, y, more in way]
+        arms.append(pipe(corners, 0.14, around=10, end_radius=0.04))
+    skeleton = found(united(head, *arms)).figure.skeleton
+    counts = [1] * skeleton.n_joints
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent > 0:
+            counts[joint] = counts[parent] + 1
+    tips = {*range(skeleton.n_joints)} - {*skeleton.parents.tolist()}
+    assert len(tips) == 8 and len({counts[tip] for tip in tips}) == 1
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_armchair_has_the_same_legs_wherever_the_grid_is(monkeypatch, shift):
+    monkeypatch.setattr("viewer.autorig.solid._OFFSETS", np.array([0.001, 0.002, 0.003]) + shift)
+    shape, feet = armchair()
+    skeleton = found(shape).figure.skeleton
+    joints = joints_of(skeleton)
+    # Where a leg and an armrest meet, at a corner of the seat, is no joint of its own.
+    assert_allclose(joints["root"][:2], [0.0, 1.1], atol=0.15)
+    for foot in feet:
+        leg = min(joints, key=lambda name: np.linalg.norm(joints[name] - foot))
+        assert np.linalg.norm(joints[leg] - foot) < 0.3
+        assert parent_of(skeleton, parent_of(skeleton, leg)) == "root"
+
+
 def test_thin_parts_without_bones_are_reported_with_their_part_of_the_surface(monkeypatch):
     half_resolution(monkeypatch)
     # A body with a tail, which has bones, and a fin on its back, which has none.

@@ -23,7 +23,7 @@ from viewer.rigs.arrays import Bools, Floats, Ints
 _TOLERANCE = 0.5  # of the polyline, relative to the half width
 _ROUGH = 1.0  # of the polyline, in voxels: paths are known to half a voxel
 _BENT = np.radians(20.0)  # least change of direction at a joint
-_SHARP = np.radians(35.0)  # change of direction that a jointed limb has at least once
+_SHARP = np.radians(30.0)  # norm of the changes of direction of a jointed limb
 # A bend is sharp if most of its change of direction is within this length on both sides, relative
 # to the half width; a limb is jointed if most of its bends are sharp, weighted by their
 # squared angles.
@@ -40,6 +40,9 @@ _STRAIGHT = 1e-6  # distance from a bone up to which a path is straight, relativ
 # Distance of a limb's path from the mirrored one of its pair, in half widths or voxels, up to which
 # both are in mirrored poses.
 _MIRRORED = 1.5
+# Ratios of lengths and of widths up to which limbs are of a kind.
+_AS_LONG, _AS_WIDE = 1.25, 1.25
+_SOME = 1.0 / 3.0  # fraction of the limbs of a kind of which all get the joints
 
 
 def joint_points(
@@ -48,11 +51,12 @@ def joint_points(
     """Return the joints of each chain, without the first hub and with the last one: (N, 3)."""
     voxel = solid.spacing
     found = [np.zeros((0, 3))] * len(tree.chains)
+    plans = _plans(tree.chains, solid, factor)
     for number, chain in enumerate(tree.chains):
         other = partner.get(number)
         if other is not None and other < number:
             continue
-        fractions, bends = _fractions(chain, solid, factor)
+        fractions, bends = plans[number]
         path = chain.outer
         if other is None:
             if plane is not None and is_central(tree, number, plane, voxel):
@@ -61,7 +65,7 @@ def joint_points(
             continue
         assert plane is not None  # only a plane of symmetry has two sides
         twin = tree.chains[other]
-        theirs, they_bend = _fractions(twin, solid, factor)
+        theirs, they_bend = plans[other]
         there = twin.outer
         gap = float(np.linalg.norm(path - plane.mirrored(there), axis=1).max())
         is_mirrored = gap <= _MIRRORED * max(chain.half_width, twin.half_width, voxel)
@@ -80,23 +84,81 @@ def joint_points(
     return found
 
 
-def _fractions(chain: Chain, solid: Solid, factor: float) -> tuple[Floats, bool]:
+def _plans(chains: tuple[Chain, ...], solid: Solid, factor: float) -> list[tuple[Floats, bool]]:
+    """Return the joints of each chain, as in ``_fractions``.
+
+    Chains of a kind, as the arms of an octopus, bend alike and have as many joints: small
+    differences decide for a single one.
+    """
+    alone = [joint_lengths(chain, solid.spacing, factor) for chain in chains]
+    found = [lengths for lengths, _ in alone]
+    bend = [score >= 1.0 for _, score in alone]
+    for kind in _kinds(chains):
+        jointed = bool(np.mean([alone[number][1] for number in kind]) >= 1.0)
+        for number in kind:
+            if bend[number] != jointed:
+                found[number] = joint_lengths(chains[number], solid.spacing, factor, jointed)[0]
+                bend[number] = jointed
+        counts = [len(found[number]) for number in kind]
+        usual = max(count for count in counts if counts.count(count) >= _SOME * len(counts))
+        outer = [max(chains[number].length - chains[number].begin, 1e-300) for number in kind]
+        shares = np.mean(
+            [
+                (found[number] - chains[number].begin) / length
+                for number, length in zip(kind, outer, strict=True)
+                if len(found[number]) == usual
+            ],
+            axis=0,
+        )
+        for number, length in zip(kind, outer, strict=True):
+            if len(found[number]) != usual:
+                found[number] = chains[number].begin + length * shares
+    return [
+        _fractions(chain, lengths, bends, solid)
+        for chain, lengths, bends in zip(chains, found, bend, strict=True)
+    ]
+
+
+def _kinds(chains: tuple[Chain, ...]) -> list[list[int]]:
+    """Return the chains that are about as long and as wide as others, with as many parts."""
+    found: list[list[int]] = []
+    for number, chain in enumerate(chains):
+        for kind in found:
+            first = chains[kind[0]]
+            alike = (
+                _ratio(chain.length - chain.begin, first.length - first.begin) <= _AS_LONG
+                and _ratio(chain.half_width, first.half_width) <= _AS_WIDE
+            )
+            if alike and (chain.end < 0, chain.stiff) == (first.end < 0, first.stiff):
+                kind.append(number)
+                break
+        else:
+            found.append([number])
+    return [kind for kind in found if len(kind) > 1]
+
+
+def _ratio(a: float, b: float) -> float:
+    return max(a, b) / max(min(a, b), 1e-300)
+
+
+def _fractions(chain: Chain, lengths: Floats, bends: bool, solid: Solid) -> tuple[Floats, bool]:
     """Return the joints' lengths from 0 where a chain leaves its hub to 1 at its end.
 
     Also returns whether they are where it bends or where its parts meet.
     """
-    lengths, bends = joint_lengths(chain, solid.spacing, factor)
     inside = bones_inside(chain, lengths, solid)
     bends |= len(inside) > len(lengths)
-    lengths = inside
-    lengths = np.maximum(lengths - chain.begin, 0.0)
+    lengths = np.maximum(inside - chain.begin, 0.0)
     return lengths / max(chain.length - chain.begin, 1e-300), bends
 
 
-def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, bool]:
+def joint_lengths(
+    chain: Chain, spacing: float, factor: float, jointed: bool | None = None
+) -> tuple[Floats, float]:
     """Return the lengths (N,) along a chain of its joints, the end included.
 
-    Also returns whether they are where it bends or where its parts meet.
+    Also returns how clearly they are where it bends or where its parts meet, from 1. ``jointed``:
+    whether it is a limb of straight parts, None if its shape tells.
     """
     width = chain.half_width
     # A part that does not bend moves with the joint at its base: the last one is at its very end.
@@ -111,14 +173,14 @@ def joint_lengths(chain: Chain, spacing: float, factor: float) -> tuple[Floats, 
         start = max(start, seams.pop(0))
         first = [start]
     if not seams and not _is_stiff(chain, start, stop):
-        inner, jointed = _inner_joints(chain, start, stop, spacing, factor)
-        return np.array([*first, *inner, stop]), jointed
+        inner, score = _inner_joints(chain, start, stop, spacing, factor, jointed)
+        return np.array([*first, *inner, stop]), score
     found = first
     for begin, end in pairwise([start, *seams, stop]):
         if end - begin > _RIGID * width and not _is_stiff(chain, begin, end):
-            found = [*found, *_inner_joints(chain, begin, end, spacing, factor)[0]]
+            found = [*found, *_inner_joints(chain, begin, end, spacing, factor, jointed)[0]]
         found = [*found, end]
-    return np.array(found), True
+    return np.array(found), np.inf
 
 
 def bones_inside(chain: Chain, lengths: Floats, solid: Solid) -> Floats:
@@ -152,22 +214,27 @@ def _is_stiff(chain: Chain, begin: float, end: float) -> bool:
 
 
 def _inner_joints(
-    chain: Chain, start: float, stop: float, spacing: float, factor: float
-) -> tuple[Floats, bool]:
-    """Return the lengths of joints between two of a chain (N,), and whether it bends there."""
+    chain: Chain,
+    start: float,
+    stop: float,
+    spacing: float,
+    factor: float,
+    jointed: bool | None,
+) -> tuple[Floats, float]:
+    """Return the lengths of joints between two of a chain (N,), and how clearly it bends there."""
     width, length = chain.half_width, stop - start
     path = at_lengths(chain.points, np.linspace(start, stop, max(2, int(length / spacing) + 1)))
     closest = max(_CLOSEST * width, _CLOSEST_PART * length)
     bends = _bends(path, max(_TOLERANCE * width, _ROUGH * spacing), closest)
-    jointed = _is_jointed(path, bends, _AROUND * max(width, 2.0 * spacing))
-    if jointed:
+    score = _jointedness(path, bends, _AROUND * max(width, 2.0 * spacing))
+    if score >= 1.0 if jointed is None else jointed:
         inner = start + arc_lengths(path)[bends] * length / max(arc_lengths(path)[-1], 1e-300)
     else:
         # The trunk has a joint where limbs begin, and more only between hubs far apart.
         count = (length / width) ** _DENSITY / factor
         bones = max(1, int(count) if chain.end >= 0 else round(count))
         inner = start + length * np.arange(1, bones) / bones
-    return inner, jointed
+    return inner, score
 
 
 def _seams(
@@ -240,12 +307,10 @@ def _neareston_plane(points: Floats, start: Floats, end: Floats) -> Floats:
     return nearest
 
 
-def _is_jointed(path: Floats, bends: list[int], around: float) -> bool:
-    """Return whether a path consists of straight parts, and not of a curve."""
+def _jointedness(path: Floats, bends: list[int], around: float) -> float:
+    """Return how clearly a path consists of straight parts, and not of a curve: from 1."""
     corners = [0, *bends, len(path) - 1]
     angles = _angles(path[corners])
-    if angles.max(initial=0.0) < _SHARP:
-        return False
     lengths = arc_lengths(path)
     sharp = 0.0
     for before, bend, after, angle in zip(
@@ -260,7 +325,9 @@ def _is_jointed(path: Floats, bends: list[int], around: float) -> bool:
         turned = _angles(np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)]))
         if float(turned[0]) >= _MOST * angle:
             sharp += angle**2
-    return bool(sharp >= _MOST * (angles**2).sum())
+    # The norm is nearly the same for two bends as for one that is found in their place.
+    squares = float((angles**2).sum())
+    return min(float(np.sqrt(squares)) / _SHARP, sharp / max(_MOST * squares, 1e-300))
 
 
 def _angles(corners: Floats) -> Floats:

@@ -12,6 +12,7 @@ through the middle of the solid form a tree (Sato et al. 2000).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -75,6 +76,14 @@ class Chain:
     def length(self) -> float:
         """Length of the path."""
         return float(arc_lengths(self.points)[-1])
+
+    def starting(self, place: Floats) -> Chain:
+        """Return the chain with its first point (3,) elsewhere in the hub."""
+        old, new = (float(np.linalg.norm(self.points[1] - at)) for at in (self.points[0], place))
+        points = np.concatenate([place[None], self.points[1:]])
+        return replace(
+            self, points=points, begin=max(self.begin + new - old, 0.0) if self.begin else 0.0
+        )
 
     @property
     def outer(self) -> Floats:
@@ -149,8 +158,9 @@ class _Field:
         self.tips = self._levels.tips(lambda found: self._is_limb(found) or self._is_wanted(found))
         routes = [route[::-1] for route in paths.to(np.array([source]), self.tips.rows)]
         stands = [k for k, route in enumerate(routes) if self._stands(k, route[::-1])]
-        thick = self._widths[self._levels.labels] <= PLATE * self.radii
-        joined = paths.joined([routes[k] for k in stands], thick)
+        self.is_thick = self._widths[self._levels.labels] <= PLATE * self.radii
+        """(N,). Which voxels are in no plate."""
+        joined = paths.joined([routes[k] for k in stands], self.is_thick)
         self.routes = dict(zip(stands, joined, strict=True))
         """Paths to the tips of limbs, by the index of the tip."""
 
@@ -232,6 +242,12 @@ class _Field:
         others = {*self.routes} - tips
         met = [at for at, those in self.tips.meetings if those & tips and those & others]
         return max(met, default=0.0)
+
+    def is_stub(self, row: int, tips: frozenset[int]) -> bool:
+        """Return whether what some tips beyond a voxel have in common is wider than long."""
+        met = [at for at, those in self.tips.meetings if len(those & tips) > 1]
+        length = max(met, default=0.0) - self.parting(tips)
+        return length <= _OWN * float(self.widths(np.array([row]))[0])
 
 
 def tree_of(solid: Solid, paths: Paths, source: int, wanted: Floats = _NOWHERE) -> Tree:
@@ -326,15 +342,19 @@ def _hubs(field: _Field, source: int) -> tuple[dict[int, int], list[int]]:
     for row in parting:
         if row == source:
             continue
-        if field.distances[row] + radii.max() < field.parting(frozenset(beyond[row])):
+        tips = frozenset(beyond[row])
+        way = [row]
+        while way[-1] not in hub_of:
+            way.append(above[way[-1]])
+        is_far_inside = field.distances[row] + radii.max() < field.parting(tips)
+        if is_far_inside or (not field.is_thick[way].all() and field.is_stub(row, tips)):
             # Far inside of a part that is wider than thick, as a seat, other limbs still have the
             # same level sets: it is one part, although the paths to a leg and to an arm have some
-            # of their way in common. In a part as thick as wide, a hub is a shoulder; behind a
-            # waist, it belongs to another part.
-            way = [row]
-            while way[-1] not in hub_of:
-                way.append(above[way[-1]])
-            if radii[way].min() >= _NARROWER * radii[way].max():
+            # of their way in common. So are the corners of a plate. In a part as thick as wide, a
+            # hub is a shoulder; behind a waist, it belongs to another part.
+            # Radii are known to half a voxel: in a plate of three voxels, they differ by a third.
+            half = 0.5 * field.solid.spacing
+            if radii[way].min() + half >= _NARROWER * (radii[way].max() - half):
                 hub_of[row] = hub_of[way[-1]]
                 continue
         # In a wide part, several paths may run beside each other.

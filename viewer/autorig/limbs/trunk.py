@@ -1,10 +1,10 @@
 """Trunk of a solid, where its skeleton has its root, and the limbs outwards from there.
 
-The tree of limbs is made twice: first from the deepest voxel, to find the trunk, then from there;
-and up to three times more from the middle of a trunk that is a plate, such as the top of a table,
-which each of them finds better. The trunk is where most limbs meet, so that no branch has most of
-the tips; the foot of what stands on one limb, such as a plant or a robot's arm; the thick part
-between two limbs; or the thicker end of what has no branches.
+The tree of limbs is made twice: first from a deep voxel near the middle, to find the trunk, then
+from there. If that is far from the middle of a trunk that is a plate, such as the top of a table,
+it is made again from there, up to three times. The trunk is where most limbs meet, so that no
+branch has most of the tips; the foot of what stands on one limb, such as a plant or a robot's arm;
+the thick part between two limbs; or the thicker end of what has no branches.
 """
 
 from __future__ import annotations
@@ -14,21 +14,26 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.autorig.anatomy import arc_lengths
-from viewer.autorig.limbs.tree import PLATE, Tree, at_lengths, tree_of
+from viewer.autorig.limbs.tree import PLATE, Tree, at_lengths, is_bone_inside, tree_of
 from viewer.autorig.medial import Paths
 from viewer.autorig.solid import Solid
 from viewer.progress import report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
 
-# Least radius, relative to the largest one, of the place where the search for the trunk begins: the
-# deepest one may be at a border, as where the seat, the back and a leg of a chair meet.
-_DEEP = 0.75
+# Distance from the middle of the solid that one more unit of radius is worth where the search for
+# the trunk begins: the deepest place may be at a border, as where the seat, the back and a leg of a
+# chair meet. Beyond 1, that place is in the middle between surfaces.
+_DEEP = 5.0
 _ROUNDS = 4  # searches from the trunk: each finds the middle of a plate better
+# Distance of a plate's middle, relative to the distance at which limbs begin, from where their
+# search may as well begin: the limbs that it finds are the same.
+_NEAR = 0.25
 # What stands on one limb: heights of the lowest surface of the foot and of all other tips, relative
 # to the solid's, and the ratio of the foot's half width to their radii.
 _FOOT, _STANDS, _STEADY = 0.05, 0.12, 1.5
 _UPRIGHT = 0.3  # height, relative to the size, of what stands rather than lies
-# Radius of a trunk between two limbs, relative to both: of a kettlebell, not of a snake.
+# Radius or half width of a trunk between two limbs, relative to both: of a kettlebell, not of a
+# snake.
 _BODY = 2.0
 
 # Length of the part of a trunk beyond its middle, relative to its half width, if it is long.
@@ -38,9 +43,8 @@ _SLENDER = 2.0
 def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     """Return the hubs and chains of a solid outwards from its trunk."""
     centers = solid.centers(solid.voxels)
-    deep = np.flatnonzero(_is_deep(solid))
-    middle = centers.mean(axis=0)
-    source = int(deep[np.linalg.norm(centers[deep] - middle, axis=1).argmin()])
+    apart = np.linalg.norm(centers - centers.mean(axis=0), axis=1)
+    source = int((apart - _DEEP * paths.radii).argmin())
     report_fraction(0.1)
     tree = tree_of(solid, paths, source)
     report_fraction(0.4)
@@ -57,16 +61,7 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
         tree = tree_of(solid, paths, root)
         cuts.append(tree.cuts)
         root = _middle_of_plate(solid, tree)
-    return replace(tree, cuts=np.concatenate(cuts))
-
-
-def _is_deep(solid: Solid) -> Bools:
-    """Return which voxels (N,) have none around them that is deeper, and are deep themselves."""
-    from scipy.ndimage import maximum_filter
-
-    radii, around = solid.radii(), maximum_filter(solid.distance, 3)[tuple(solid.voxels.T)]
-    found: Bools = (radii >= around) & (radii >= _DEEP * radii.max())
-    return found
+    return replace(_centred(solid, tree), cuts=np.concatenate(cuts))
 
 
 def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
@@ -99,9 +94,11 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
         is_foot = heights <= top
         return _deepest_near(solid, solid.centers(solid.voxels[is_foot]).mean(axis=0))
     if len(inwards) == 2:
-        between = sum(chain.start == 0 for chain in tree.chains) == 2
+        begins = [chain.begin for chain in tree.chains if chain.start == 0]
         thickest = max(chain.half_width for chain in tree.chains)
-        if between and tree.radii[0] >= _BODY * thickest:
+        # A foot of two posts is wider than thick.
+        half = max(float(tree.radii[0]), min(begins))
+        if len(begins) == 2 and half >= _BODY * thickest:
             return int(tree.rows[0])
         return _thicker_end(solid, paths, ends)
     # As in the centroid of a tree, with tips as weights; ties go to the wider place.
@@ -145,13 +142,44 @@ def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> tuple[Ints, bool]:
 
 
 def _middle_of_plate(solid: Solid, tree: Tree) -> int | None:
-    """Return the voxel in the middle of a trunk that is a plate, as a table's; None for others."""
+    """Return the voxel in the middle of a trunk that is a plate, as a table's.
+
+    None for other trunks, and if the root is near that place.
+    """
+    middle = _between_limbs(tree)
+    if middle is None:
+        return None
+    begins = [chain.begin for chain in tree.chains if chain.start == 0]
+    if np.linalg.norm(middle - tree.hubs[0]) <= _NEAR * np.median(begins):
+        return None
+    return _deepest_near(solid, middle)
+
+
+def _between_limbs(tree: Tree) -> Floats | None:
+    """Return the middle (3,) of where limbs begin around a trunk that is a plate; None for others.
+
+    The deepest place may be where the plate and one leg meet.
+    """
     limbs = [chain for chain in tree.chains if chain.start == 0]
     if len(limbs) < 3 or np.median([limb.begin for limb in limbs]) <= PLATE * tree.radii[0]:
         return None
-    # The deepest place may be where the plate and one leg meet.
     bases = [at_lengths(limb.points, np.array([limb.begin]))[0] for limb in limbs]
-    return _deepest_near(solid, np.mean(bases, axis=0))
+    middle: Floats = np.mean(bases, axis=0)
+    return middle
+
+
+def _centred(solid: Solid, tree: Tree) -> Tree:
+    """Return a tree whose root is in the middle of a trunk that is a plate, not only near it."""
+    middle = _between_limbs(tree)
+    if middle is None:
+        return tree
+    root = solid.centers(solid.voxels[_deepest_near(solid, middle)])
+    if not all(
+        is_bone_inside(solid, root, chain.points[1]) for chain in tree.chains if chain.start == 0
+    ):
+        return tree
+    chains = tuple(chain if chain.start else chain.starting(root) for chain in tree.chains)
+    return replace(tree, hubs=np.concatenate([root[None], tree.hubs[1:]]), chains=chains)
 
 
 def _deepest_near(solid: Solid, place: Floats) -> int:
