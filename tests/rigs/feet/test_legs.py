@@ -90,19 +90,24 @@ def test_legs_are_found_by_name():
     assert legs_of(FIGURE.skeleton) == [Leg(1, 2, 3, 3), Leg(4, 5, 6, 6)]
 
 
+# A leg that was straight reaches 0.99 of its length, one that may be straight all of it.
+@pytest.mark.parametrize(("extended", "reached"), [(1.0, 1.0), (0.97, 0.99)])
 @pytest.mark.parametrize("up_down", [1.0, -1.0])
-def test_body_is_lowered_if_its_legs_are_too_short(up_down):
+def test_body_is_lowered_if_its_legs_are_too_short(up_down, extended, reached):
     shift = np.zeros((FRAMES, 3))
     shift[:, 2] = 0.2 * np.linspace(-0.5, 0.5, FRAMES)
     times = np.arange(FRAMES) / RATE
     posed = frames_of(FIGURE, standing(FIGURE), times)
     points = up_down * world_frames(FIGURE, posed)[..., :3, 3]
-    lowered = lowering(points, [Leg(1, 2, 3, 3)], [shift], RATE, up_down * np.eye(3)[1])
+    up = up_down * np.eye(3)[1]
+    lowered = lowering(points, [Leg(1, 2, 3, 3)], [shift], RATE, up, extended)
     # At the first and last frame, the ankle is 0.1 beside the hip; the leg is 0.8 long.
-    needed = 0.8 - np.sqrt((0.9999 * 0.8) ** 2 - 0.1**2)
-    assert needed <= lowered.max() < needed + 1e-6
-    height = np.sqrt((0.9999 * 0.8) ** 2 - shift[:, 2] ** 2)
-    assert (0.8 - lowered <= height + 1e-9).all()
+    needed = 0.8 - np.sqrt((reached * 0.9999 * 0.8) ** 2 - 0.1**2)
+    assert needed - 1e-12 <= lowered.max() < needed + 1e-6
+    height = np.sqrt((reached * 0.9999 * 0.8) ** 2 - shift[:, 2] ** 2)
+    # A leg that is hardly stretched stays straighter.
+    is_long = np.hypot(0.8, shift[:, 2]) > 0.8 + (1.0 - reached) * 0.2
+    assert (0.8 - lowered <= height + 1e-9)[is_long].all() and is_long.sum() > 20
 
 
 UP = np.array([0.0, 1.0, 0.0])
