@@ -1,6 +1,7 @@
 """The option ``--model-path``: a remembered folder of body models, and models opened by name."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer import models
 from viewer.cli import run
+from viewer.resources import resource
 
 FILES = {
     "smplx/SMPLX_NEUTRAL.npz": "smplx:neutral",
@@ -124,6 +126,22 @@ def test_empty_folder_is_reported(tmp_path, capsys):
 
 def test_name_without_a_model_folder_is_a_missing_file(capsys):
     assert refused(capsys, "info", "any") == "any: cannot be read: No such file or directory"
+
+
+def test_misspelt_bundled_figure_is_suggested(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert refused(capsys, "info", "foxx") == "foxx: no such file; did you mean fox?"
+    assert (
+        refused(capsys, "info", "fox.glb") == "fox.glb: cannot be read: No such file or directory"
+    )
+    Path("lift.bvh").write_text(resource("assets", "samples", "lift.bvh").read_text())
+    for call in (
+        lambda: viewer.load("boddy"),
+        lambda: viewer.retarget("lift.bvh", onto="boddy"),
+        lambda: viewer.rig("fox", template="boddy"),
+    ):
+        with pytest.raises(viewer.ViewerError, match=r"^boddy: no such file; did you mean body\?$"):
+            call()
 
 
 def test_published_model_that_is_missing_says_where_it_is(folder, capsys):

@@ -56,8 +56,8 @@ from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.loading.mesh_sequence import ARCHIVES, SEQUENCES, read_mesh_sequence, stores_frames
-from viewer.models import BUNDLED, named_files, resolve
-from viewer.near_names import did_you_mean, name_hint
+from viewer.models import named_files, resolve
+from viewer.near_names import name_hint
 from viewer.phrases import counted, listed, printable, rounded
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats
@@ -327,7 +327,7 @@ def _asked_template(
     files = [
         file
         for name in arguments.skeleton or arguments.template or ["body"]
-        for file in _template_files(name)
+        for file in named_files(name)
     ]
     return files, _template(files, option, arguments.rig or "", pose, frames, inputs), ()
 
@@ -589,14 +589,6 @@ def _put_at_rest(actor: Actor) -> None:
     actor.pose = figure_pose(actor.figure)
     actor.own_pose.shape_weights = shape
     actor.is_present = True
-
-
-def _template_files(name: str) -> list[Path]:
-    path, *others = named_files(name)
-    near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
-    if near:
-        raise FormatError.fault("F001.no-template: no such file; {near}", path, near=near)
-    return [path, *others]
 
 
 def _settings(

@@ -102,4 +102,5 @@ def load(
     except FormatError as problem:
         from viewer.models.download import with_models
 
-        raise with_models(problem, [*paths, *([model] if model is not None else [])]) from None
+        asked = [*paths, *([settings.model] if settings.model is not None else [])]
+        raise with_models(problem, asked) from None

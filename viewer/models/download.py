@@ -14,7 +14,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError, ViewerError
 from viewer.formats import Source, detect
 from viewer.media.unfinished import new_prefix
-from viewer.models import data_folder, known_models, load_model_folder
+from viewer.models import BUNDLED, data_folder, known_models, load_model_folder
 from viewer.near_names import did_you_mean
 from viewer.phrases import all_of, printable
 from viewer.progress import report
@@ -135,7 +135,10 @@ def with_models(problem: FormatError, files: Sequence[str | Path]) -> FormatErro
     if folder is None:
         published = CATALOG.get(str(problem.path).lower().partition(":")[0])
         if published is None:
-            return problem
+            near = "" if problem.path.suffix else did_you_mean(str(problem.path), BUNDLED)
+            if not near:
+                return problem
+            return FormatError.fault("F001.no-name: no such file; {near}", problem.path, near=near)
         return FormatError.fault(
             "F001.no-model-folder: no such file or model; {title} is published at {address}; name "
             "its folder once: viewer models --model-path FOLDER",
