@@ -19,11 +19,12 @@ _FLAGS = [
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
     *("--disable-background-networking", "--remote-debugging-pipe"),
 ]
-# Chromium reads commands from descriptor 3 and writes answers to descriptor 4.
-_LOADED = (
+# A promise of the page's end of loading.
+LOADED = (
     "new Promise(done => document.readyState === 'complete' ? done()"
     " : addEventListener('load', done))"
 )
+# Chromium reads commands from descriptor 3 and writes answers to descriptor 4.
 _SHELL = 'commands=$1 answers=$2; shift 2; exec "$@" 3<&"$commands" 4>&"$answers"'
 
 
@@ -99,7 +100,7 @@ class Browser:
         self.requests.clear()
         address = path.resolve().as_uri() + (f"#{fragment}" if fragment else "")
         self.send("Page.navigate", url=address)
-        self.run(_LOADED)
+        self.run(LOADED)
         self.run("viewer.ready.then(() => null)")
         self.settle()
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import needs_chromium
+from browser import LOADED, needs_chromium
 from numpy.testing import assert_allclose
 from PIL import Image
 from rendering.drawn_figures import random_figure, random_pose
@@ -261,7 +261,7 @@ def test_poster_is_shown_until_the_view_has_started(browser, tmp_path, poster):
     text = (tmp_path / "a.html").read_text("utf-8")
     (tmp_path / "b.html").write_text(text.replace("<script>", "<script>// "), "utf-8")
     browser.send("Page.navigate", url=(tmp_path / "b.html").as_uri())
-    browser.run("new Promise(done => setTimeout(done, 300))")
+    browser.run(LOADED)
     alt = "[document.querySelector('#poster').alt, document.querySelector('#poster').naturalWidth]"
     assert browser.run(alt) == ["name: 3D view", poster[0]]
 
@@ -274,10 +274,7 @@ def test_page_without_webgl_shows_its_picture_and_no_controls_that_do_nothing(br
     script = browser.send("Page.addScriptToEvaluateOnNewDocument", source=without)
     try:
         browser.send("Page.navigate", url=(tmp_path / "a.html").as_uri())
-        browser.run(
-            "new Promise(done => document.readyState === 'complete' ? done()"
-            " : addEventListener('load', done))"
-        )
+        browser.run(LOADED)
         browser.run("viewer.ready.catch(() => null)")
         hidden = "['panels', 'timeline'].map(id => document.getElementById(id).hidden)"
         assert browser.run(hidden) == [True, True]
