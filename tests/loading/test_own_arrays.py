@@ -196,7 +196,7 @@ def test_arrays_that_do_not_fit_are_named(changes, message):
             r"translations: expected shape \(3, 3\), found \(2, 3\)",
         ),
         (np.zeros((3, 2, 3)), {"present": [True]}, r"present: expected shape \(3,\), found \(1,\)"),
-        (np.zeros((3, 2, 3)), {"fps": 0}, "frame rate: expected"),
+        (np.zeros((3, 2, 3)), {"fps": 0}, "fps: expected 1e-06 to"),
     ],
 )
 def test_motions_that_do_not_fit_are_named(rotations, keywords, message):

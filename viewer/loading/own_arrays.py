@@ -24,7 +24,7 @@ from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.material import Material, Texture
 from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.motion.sampled_clip import SampledClip
-from viewer.rigs.motion.timing import Timing
+from viewer.rigs.motion.timing import RATES, Timing, is_rate
 from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import Skeleton, ball_skeleton
 from viewer.rigs.skin import Skin, skin_from_entries
@@ -213,6 +213,8 @@ def animate(
 
     check_type("figure", figure, Figure)
     check_type("fps", fps, float)
+    if not is_rate(fps):
+        raise RigError(f"fps: expected {RATES}, found {fps:g}")
     check_type("representation", representation, str, NoneType)
     check_type("name", name, str)
     skeleton = figure.require_skeleton()
