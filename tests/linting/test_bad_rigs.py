@@ -415,6 +415,24 @@ def test_hands_of_crossed_arms_have_the_right_names():
     assert linted(moved(*moves), (symmetry,)) == []
 
 
+@pytest.mark.parametrize(("copies", "severity"), [(0, "warning"), (4000, "note")])
+def test_small_weights_are_seen_on_a_thousandth_of_the_vertices(copies, severity):
+    """Ten of 7,813 vertices of the head have 0.02 of a foot; copies of one are without it."""
+    weights = table().copy()
+    head = np.flatnonzero(weights[:, joint("head")] > 0.99)
+    weights[head[:10]] *= 0.98
+    weights[head[:10], joint("right_foot")] += 0.02
+    rows = np.concatenate([np.arange(len(weights)), np.full(copies, head[20])])
+    mesh = body().mesh
+    mesh = replace(mesh, positions=mesh.positions[rows], normals=mesh.normals[rows])
+    vertices, joints = np.nonzero(weights[rows])
+    values, binds = weights[rows][vertices, joints], body().skin.inverse_bind
+    skin = skin_from_entries(len(rows), vertices, joints, values, binds)
+    figure = Figure("dense", mesh=mesh, skeleton=body().skeleton, skin=skin, up=body().up)
+    (found,) = stray_weights.check(Subject(Actor(figure), up=figure.up))
+    assert (found.code, found.severity, len(found.vertices)) == ("W011", severity, 10)
+
+
 def test_large_head_is_no_leak():
     assert linted(leak_everywhere(0.0), (stray_weights,)) == []
 

@@ -177,7 +177,8 @@ def _found(
     values: Floats, known: Bools, shapes: tuple[_Shape, ...], least: float
 ) -> OffPath | None:
     """Return what has one of the shapes in values (F, N, C), and exceeds a size."""
-    differences = {order: np.diff(values, n=order, axis=0) for order in (1, 2, 3, 4)}
+    orders = sorted({1, *(shape.order for shape in shapes)})
+    differences = {order: np.diff(values, n=order, axis=0) for order in orders}
     ends = ((_AROUND + 1, _AROUND + _LONGEST), (0, 0))
     lengths = {
         order: np.pad(np.linalg.norm(each, axis=2), ends) for order, each in differences.items()
@@ -214,8 +215,10 @@ def _matches(
     start = beyond - order
     count = len(values) - beyond - n_frames - order + 1 - start
     is_near = np.ones((max(count, 0), values.shape[1]), dtype=np.bool_)
-    for k, part in enumerate(np.abs(pattern).tolist()):
-        if part > _SHAPE * highest:
+    # The largest part first: few values of most motions exceed it.
+    for k in np.argsort(-np.abs(pattern), kind="stable").tolist():
+        part = float(np.abs(pattern[k]))
+        if part > _SHAPE * highest and is_near.any():
             there = lengths[order][_AROUND + 1 + start + k :][: len(is_near)]
             is_near &= there > (part - _SHAPE * highest) * least
     rows, columns = np.nonzero(is_near)

@@ -39,7 +39,8 @@ _BEYOND = 0.16  # maximum distance beyond the reach of a vertex that is not
 _TWICE = 2.0  # maximum distance relative to the reach: weights of long bones end softly
 # Weights that fade out over single vertices hardly move them.
 _STRONG = 0.05  # smallest weight of a stray that is seen at once
-_MANY = 8  # number of vertices whose smaller weights are seen together
+# Number of vertices, and their fraction of the mesh, whose smaller weights are seen together
+_MANY, _PATCH = 8, 1e-3
 _TOGETHER = 256  # vertices whose distances from others are computed together
 # In the same rigs, weights below this one of a joint are at no more than 13 % of all places, mostly
 # fewer than its larger ones: a joint leaks to the whole body if they are at many more.
@@ -337,7 +338,8 @@ def _strays(
     worst = int(rows[0])
     vertices, joints = distinct(found.vertices[rows]), distinct(found.joints[rows])
     labels = joint_labels(figure.require_skeleton())
-    is_seen = found.weights[rows].max() > _STRONG or len(vertices) >= _MANY
+    many = max(_MANY, _PATCH * figure.require_mesh().n_vertices)
+    is_seen = found.weights[rows].max() > _STRONG or len(vertices) >= many
     yield subject.found(
         "W011.strays: {n} influenced by joints far away: {names} (worst: vertex {vertex}, by "
         "{weight} of {joint}, {distance} away)",
