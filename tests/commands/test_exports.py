@@ -76,7 +76,7 @@ def test_requests_that_cannot_be_met_are_refused(turning, tmp_path, settings, er
 
 
 def test_other_objects_are_refused(tmp_path):
-    with pytest.raises(ViewerError, match=r"^export: expected a scene or an actor, found str"):
+    with pytest.raises(ViewerError, match=r"^export: expected a scene .*, found str; viewer.load"):
         viewer.export("fox", tmp_path / "own.glb")
 
 

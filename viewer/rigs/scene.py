@@ -439,6 +439,7 @@ def scene_of(what: Scene | Actor, name: str) -> Scene:
         return what
     if not isinstance(what, Actor):
         hints = {"Figure": "; viewer.Actor(figure) is one", "list": "; viewer.Scene(actors) is one"}
+        hints |= dict.fromkeys(("str", "PosixPath", "WindowsPath"), "; viewer.load(path) is one")
         found = type(what).__name__
         hint = hints.get(found, "")
         raise RigError(f"{name}: expected a scene or an actor, found {found}{hint}")
