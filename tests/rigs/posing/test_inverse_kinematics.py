@@ -222,7 +222,8 @@ def test_each_call_of_a_drag_is_short_wherever_it_leads(monkeypatch):
         calls.clear()
         reaching.follow(target)
         counts.append(len(calls))
-    # Up to eight steps towards the target and three in a search, of which some are tried again.
+    # Up to eight steps towards the target, three in a search, of which some are tried again, and
+    # four that shorten the rotation.
     assert max(counts) <= 26
 
 
@@ -318,6 +319,25 @@ def test_limits_do_not_catch_a_hand_on_its_way_along_a_path_that_it_can_follow(s
     pose.dofs[:] = path[0]
     reaching = Reaching(skeleton, pose, 3, 3)
     assert max(reaching.follow(target).distance for target in targets) < 0.001
+
+
+@pytest.mark.parametrize("way", [-1.5, 1.5])
+@pytest.mark.parametrize("elbow", [[0, -1, -5], [0, -1, 5], [0, 0, 5]])
+def test_dof_at_its_limit_does_not_swing_the_others(elbow, way):
+    # The shoulder's last rotation, by 1.5 degrees, leads the hand to each target alone. Its second
+    # one is at its limit, and the arm nearly straight. Steps that stopped there one by one rotated
+    # the first one by 11 to 14 degrees instead.
+    stiff = np.radians([[-5, 5], [-150, 0], [-5, 5]])
+    skeleton = hinged_arm(np.concatenate([NARROW_SHOULDER, stiff]))
+    start = np.radians([0, 45, 0, *elbow])
+    pose, targets = rest_pose(skeleton), []
+    for step in range(12):
+        pose.dofs[:6] = start + np.radians([0, 0, step * way, 0, 0, 0])
+        targets.append(world_matrices(skeleton, pose)[2, :3, 3])
+    dofs, distances = drag(skeleton, start, np.array(targets))
+    assert distances.max() < 1e-4
+    moved = 100.0 * np.linalg.norm(np.diff(targets, axis=0), axis=1)
+    assert (angles_between(skeleton, dofs) / moved).max() <= 5.0
 
 
 @pytest.mark.parametrize("tilt", [-1.2, -1.0, 0.6])

@@ -58,9 +58,9 @@ _RETURN = 0.05  # rotation towards the pose at the start that leaves the joint i
 _AVOID, _ROOM = 0.3, np.radians(25.0)
 _GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
 _MARGIN = 1.25  # of what a step needs, which is known by its linearisation
-# Maximum steps per call towards the target, and in a search for another pose: they bound the time
-# of a frame.
-_DRAG_ROUNDS, _SEARCH_ROUNDS = 8, 3
+# Maximum steps per call towards the target, in a search for another pose, and to shorten the
+# rotation: they bound the time of a frame.
+_DRAG_ROUNDS, _SEARCH_ROUNDS, _SHORTENING_ROUNDS = 8, 3, 4
 _SLOW = 1e-3  # relative decrease of the error below which a drag has settled
 # Distance to the target from which a joint may be held by limits or a straight chain, and movement
 # of the target after which other poses are tried again, of the chain's length.
@@ -294,6 +294,8 @@ class Reaching:
         self._target, self._wanted = target, wanted
         goal = self._eased(self._goal, _RATE * moved, inverse)
         goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
+        if moved > 0.0:
+            goal = self._shortened(goal, self._goal.values, _RATE * moved)
         self._since_held += moved
         is_held = is_settled and self._left(goal) > _MISSED * self._size
         if is_held:  # the search leads far from the pose in which the rotations were measured
@@ -310,6 +312,35 @@ class Reaching:
         self._goal = goal
         is_settled &= self._other is None
         return self._shown(most, is_settled)
+
+    def _shortened(self, state: _State, start: Floats, most: float) -> _State:
+        """Return a state at the same place with a shorter rotation from the start (N,).
+
+        Only if that is above ``most``.
+        """
+        # The steps towards a target are shortest one by one. A DOF that one of them stops at its
+        # limit is replaced by others at once, even if it would suffice in the end. Here the sum of
+        # the steps is the shortest: each minimises the rotation from the start among the DOFs that
+        # reach the target by the linearisation here (sequential quadratic programming).
+        for _ in range(_SHORTENING_ROUNDS):
+            back = start - state.values
+            turn = self._turn(back)
+            if turn <= most:
+                break
+            for part in (1.0, 0.4):
+                shorter = self._placed(self._placed(state, part * back))
+                is_there = self._left(shorter) <= max(self._left(state), _MISSED * self._size)
+                if is_there and self._turn(shorter.values - start) < 0.98 * turn:
+                    break
+            else:
+                break
+            state = shorter
+        return state
+
+    def _placed(self, state: _State, wish: Floats | None = None) -> _State:
+        """Return the state after one undamped step to the target that is nearest to a wish."""
+        error = self._wanted - state.place
+        return state.at(state.values + self._step(state, error, _LEAST_DAMPING, wish))
 
     def _shown(self, most: float, is_settled: bool) -> Reach:
         """Rotate each joint of the shown pose towards the goal, by at most ``most``."""
