@@ -18,6 +18,7 @@ from viewer.autorig.limbs import tree as limb_tree
 from viewer.autorig.limbs.joints import bones_inside
 from viewer.autorig.limbs.sides import Plane, paired_chains
 from viewer.autorig.limbs.tree import Chain, Tree
+from viewer.autorig.limbs.trunk import footprint
 from viewer.autorig.medial import Protrusion
 from viewer.autorig.parts import parts_of
 from viewer.autorig.settings import SkeletonSettings
@@ -383,6 +384,14 @@ def test_foot_has_the_root_in_its_middle_and_no_limb_at_its_rim(monkeypatch):
     joints = joints_of(lamp.figure.skeleton)
     assert_allclose(joints["root"], [0.0, 0.2, 0.0], atol=0.1)
     assert "1 limb," in str(lamp.lines[0])
+
+
+def test_footprint_of_an_upright_board_is_narrow():
+    # 0.2 thick, 1 tall and 2 long: the circle below it has a radius of 0.1, not of 0.5.
+    solid = solid_of(*box((-0.1, 0, -1), (0.1, 1, 1)), 60)
+    lowest = np.ones(len(solid.voxels), dtype=np.bool_)
+    assert abs(footprint(solid, lowest, np.array([0.0, 1, 0])) - 0.1) <= solid.spacing
+    assert abs(footprint(solid, lowest, np.array([1.0, 0, 0])) - 0.5) <= solid.spacing
 
 
 def lathe(profile, around=24):

@@ -50,7 +50,7 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     report_fraction(0.4)
     root: int | None = source
     if len(tree.chains):
-        root = _trunk(solid, paths, tree, centers @ up)
+        root = _trunk(solid, paths, tree, up)
         if root == source:
             root = _middle_of_plate(solid, tree)
     cuts = [tree.cuts]
@@ -64,8 +64,9 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     return replace(_centred(solid, tree), cuts=np.concatenate(cuts))
 
 
-def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
-    """Return the voxel in which the skeleton has its root; ``heights`` (N,) of all voxels."""
+def _trunk(solid: Solid, paths: Paths, tree: Tree, up: Floats) -> int:
+    """Return the voxel in which the skeleton has its root."""
+    heights = solid.centers(solid.voxels) @ up
     low, high = float(heights.min()), float(heights.max())
     inwards = [route[::-1] for route in tree.routes]
     ends = [int(route[0]) for route in inwards]
@@ -81,7 +82,7 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     steady = float(wide[foot])
     if high - low >= _UPRIGHT * solid.spacing * max(solid.inside.shape):
         # A foot may be a flat disc, which is as steady as it is wide; the jaw of a snake is none.
-        steady = max(steady, _footprint(solid, heights <= low + _FOOT * (high - low)))
+        steady = max(steady, footprint(solid, heights <= low + _FOOT * (high - low), up))
     if (
         relative[foot] <= _FOOT
         and (relative[others] >= _STANDS).all()
@@ -111,12 +112,12 @@ def _trunk(solid: Solid, paths: Paths, tree: Tree, heights: Floats) -> int:
     return int(tree.rows[min(range(len(most)), key=lambda hub: most[hub])])
 
 
-def _footprint(solid: Solid, lowest: Bools) -> float:
+def footprint(solid: Solid, lowest: Bools, up: Floats) -> float:
     """Return the radius of the largest circle below the lowest voxels, a mask (N,) of all."""
     from scipy import ndimage
 
     voxels = solid.voxels[lowest]
-    upwards = int(np.ptp(voxels, axis=0).argmin())
+    upwards = int(np.abs(up).argmax())
     ground = np.zeros(np.delete(solid.inside.shape, upwards), dtype=np.bool_)
     ground[tuple(np.delete(voxels, upwards, axis=1).T)] = True
     return solid.spacing * float(ndimage.distance_transform_edt(ground).max())
