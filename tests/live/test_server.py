@@ -199,6 +199,20 @@ def test_shapes_that_a_model_computes_are_sent_as_their_result(screen, live):
     assert screen.state.scene.actors[-1].figure.blend_shapes is None
 
 
+def test_change_while_an_actor_is_sent_is_sent_as_well(screen, live, monkeypatch):
+    actor, ask = viewer.Actor(bar()), live._ask
+
+    def bend(do, *rest):
+        answer = ask(do, *rest)
+        if do == "put":
+            actor["joint_1"] = [0.0, 0.0, QUARTER]
+        return answer
+
+    monkeypatch.setattr(live, "_ask", bend)
+    live.add(actor)
+    screen.wait(is_at(screen, [1.0, 1.0, 0.0]))
+
+
 def test_scene_is_replaced_and_followed(screen, live):
     scene = viewer.Scene([viewer.Actor(bar("a")), viewer.Actor(bar("b"))])
     live.show(scene)

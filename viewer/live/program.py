@@ -247,6 +247,8 @@ class Live:
         content, known = _content(actor), self._sent.get(actor)
         if known is not None and known.content == content:
             return
+        # Taken first: what the program changes while the actor is sent is then sent, too.
+        look, pose = _look(actor), _pose_key(actor)
         arrays: list[Values] = []
         told: dict[str, Any] = {"object": pack(_sendable(actor), arrays)}
         if known is not None:
@@ -254,7 +256,7 @@ class Live:
         number = self._ask("put", told, arrays).facts["number"]
         if known is None or known.content.clip is not actor.clip:
             _note_springs(actor)
-        self._sent[actor] = _Sent(number, content, _look(actor), _pose_key(actor))
+        self._sent[actor] = _Sent(number, content, look, pose)
 
     def _send_changes(self, actor: Actor, sent: _Sent) -> None:
         look = _look(actor)
