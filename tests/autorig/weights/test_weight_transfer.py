@@ -621,3 +621,47 @@ def test_no_match_reports_the_distance():
         "it at a median distance of 30.0% of the target's size; use a template of the same kind "
         "(--from), or --auto, which needs none"
     )
+
+
+def fork(gap):
+    """Return a flat U of two strips, 1 wide and 10 long, joined at the top; and its strips (V,)."""
+    x = np.concatenate([np.linspace(0.0, 1.0, 5), np.linspace(1.0 + gap, 2.0 + gap, 5)])
+    y = np.linspace(0.0, 10.0, 41)
+    positions = np.stack([*np.meshgrid(x, y), np.zeros((41, 10))], axis=2).reshape(-1, 3)
+    index = np.arange(410).reshape(41, 10)
+    a, b, c, d = (part for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    # Between the strips, only the uppermost row of squares is there.
+    there = np.ones((40, 9), dtype=bool)
+    there[:-1, 4] = False
+    squares = np.stack([a[there], b[there], c[there], d[there]], axis=1)
+    triangles = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]).astype(np.int32)
+    return positions, triangles, positions[:, 0] > 1.0
+
+
+def test_patch_that_lies_on_another_limb_gets_the_weights_around_it():
+    # A bulge of the left strip lies on the right one: the closest points are there, as near as
+    # those of all others and with the same normals.
+    positions, triangles, right = fork(gap=0.1)
+    skin = skin_from_entries(len(positions), np.arange(410), right.astype(int), np.ones(410), BIND)
+    target = positions.copy()
+    bulge = ~right & (np.abs(positions[:, 1] - 4.0) < 0.3) & (positions[:, 0] > 0.3)
+    target[bulge, 0] += 0.7
+    assert (target[bulge, 0] > 1.1).all()
+    template = Template(positions, triangles)
+    found = transferred_weights(template, skin, target, triangles, WeightSettings())
+    np.testing.assert_array_equal(found.matched, ~bulge)
+    below = positions[:, 1] < 9.0  # joints blend above
+    expected = np.stack([~right, right, np.zeros(410)], axis=1)[below]
+    np.testing.assert_allclose(dense(found)[below], expected, atol=1e-9)
+
+
+def test_large_patch_on_another_limb_keeps_its_matches():
+    # All of the strip's lower half is on the other strip, too large to be a mistake of its matches.
+    positions, triangles, right = fork(gap=0.1)
+    skin = skin_from_entries(len(positions), np.arange(410), right.astype(int), np.ones(410), BIND)
+    target = positions.copy()
+    lower = ~right & (positions[:, 1] < 5.0)
+    target[lower, 0] += 1.03
+    template = Template(positions, triangles)
+    found = transferred_weights(template, skin, target, triangles, WeightSettings())
+    assert found.matched.all()

@@ -7,6 +7,7 @@ these as borders, or the mesh would tear there.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.topology import Indices, components, sides_of, welded
 from viewer.rigs.mesh import side_lengths, triangle_areas
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
 # less.
@@ -108,6 +112,15 @@ def edges(triangles: Ints) -> Ints:
     keys = low[low != high].astype(np.int64) * width + high[low != high]
     unique = np.unique(keys)
     return np.stack([unique // width, unique % width], axis=1).astype(np.int32)
+
+
+def edge_graph(positions: Floats, triangles: Ints) -> csr_array:
+    """Return the lengths of the edges of triangles, sparse (V, V), in one direction each."""
+    from scipy import sparse
+
+    links, count = edges(triangles), len(positions)
+    lengths = np.linalg.norm(positions[links[:, 0]] - positions[links[:, 1]], axis=1)
+    return sparse.csr_array((lengths, (links[:, 0], links[:, 1])), shape=(count, count))
 
 
 def _joined_nearby(positions: Floats, tolerance: float) -> Ints:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from viewer.autorig.correspondence import MatchSettings, Template, match, wound_backwards
 from viewer.autorig.surface.laplacian import laplacian, neighbour_means
-from viewer.autorig.surface.welding import Welded, edges, weld
+from viewer.autorig.surface.welding import Welded, edge_graph, edges, weld
 from viewer.autorig.weights.result import (
     RigidIslands,
     WeightTransfer,
@@ -366,16 +366,12 @@ def smooth(weights: csr_array, triangles: Ints, active: Bools, rounds: int = _RO
 
 def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> Bools:
     """Return the vertices (W,) on a path of edges from a source no longer than ``reach``."""
-    from scipy import sparse
-    from scipy.sparse import csgraph as graph
+    from scipy.sparse import csgraph
 
     if not sources.any():
         return sources.copy()
-    links = edges(triangles)
-    lengths = np.linalg.norm(positions[links[:, 0]] - positions[links[:, 1]], axis=1)
-    count = len(positions)
-    matrix = sparse.csr_array((lengths, (links[:, 0], links[:, 1])), shape=(count, count))
-    distances = graph.dijkstra(
+    matrix = edge_graph(positions, triangles)
+    distances = csgraph.dijkstra(
         matrix, directed=False, indices=np.nonzero(sources)[0], limit=reach, min_only=True
     )
     return np.isfinite(distances)
