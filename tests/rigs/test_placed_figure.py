@@ -8,11 +8,12 @@ from builders import quaternions, rotation
 from numpy.testing import assert_allclose
 from rigs.animated import leg
 
+from viewer.loading import bundled_body, load
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.placed_figure import bound_in, placed
-from viewer.rigs.skinning import deform
+from viewer.rigs.skinning import deform, joint_matrices
 
 ROUNDING = 1e-12
 
@@ -78,4 +79,17 @@ def test_figure_bound_in_a_pose_is_there_at_rest_and_moves_on_from_it():
     for each, factor in ((pose, 1.0), (rest, 2.0)):
         each.dofs[:] = -0.5 * factor, 1.25
         each.rotations[2] = quaternions(np.array([[0.0, -0.6, 0.2]]))[0]
+    assert_allclose(deform(bound, rest)[0], deform(figure, pose)[0], atol=ROUNDING)
+
+
+def test_bound_figure_has_the_joints_of_its_shape():
+    figure = replace(load(bundled_body()).actors[0].figure, correctives=None)
+    pose = figure_pose(figure)
+    pose.shape_weights[:2] = 2.0, -1.0
+    pose.rotations[3] = quaternions(np.array([[0.4, 0.1, 0.0]]))[0]
+    places = joint_matrices(figure, pose)[:, :3, 3]
+    assert np.abs(places - joint_matrices(figure, figure_pose(figure))[:, :3, 3]).max() > 0.1
+    bound = bound_in(figure, pose)
+    rest = figure_pose(bound)
+    assert_allclose(joint_matrices(bound, rest)[:, :3, 3], places, atol=ROUNDING)
     assert_allclose(deform(bound, rest)[0], deform(figure, pose)[0], atol=ROUNDING)

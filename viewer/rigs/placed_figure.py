@@ -15,6 +15,7 @@ from viewer.rigs.geometry.transform import apply_transform, mean_scale
 from viewer.rigs.joint_edits import at_rest, rest_worlds
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.shape import shaped
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, scaled_skeleton
 from viewer.rigs.skin import Skin
 from viewer.rigs.skinning import deform
@@ -25,8 +26,9 @@ _ROUNDING = 1e-12  # difference from the identity of a matrix that does not rota
 def placed(figure: Figure, matrix: Floats) -> Figure:
     """Return a figure whose mesh, joints, bindings and blend shapes are moved by (4, 4).
 
-    The matrix translates, rotates and scales by one factor. DOFs stay, in the new unit; those that
-    translate a root move along its new axes. Pose correctives and springs are not changed.
+    The matrix translates, rotates and scales by one factor. DOFs stay, in the new unit; those of a
+    root still translate it along the axes of the scene. Pose correctives and springs stay as they
+    are.
     """
     scale = mean_scale(matrix)
     rotation = matrix[:3, :3] / scale
@@ -78,19 +80,19 @@ def _moved_shapes(shapes: BlendShapes, rotation: Floats, scale: float) -> BlendS
 def bound_in(figure: Figure, pose: Pose) -> Figure:
     """Return a rigged figure that at rest is what it is in a pose, bound there.
 
-    Its joints keep their axes. Pose correctives and blend shapes are left out.
+    Its joints keep their axes. Blend shapes are applied; pose correctives are left out.
     """
     place = placement_matrix(pose)
     inner = pose.copy()
     inner.figure_scale, inner.figure_translation = 1.0, np.zeros(3)
+    inner.shape_weights = np.zeros(0)
+    figure = replace(shaped(figure, pose.shape_weights), correctives=None, blend_shapes=None)
     mesh = figure.require_mesh()
     positions, normals = deform(figure, inner)
     posed = replace(
         figure,
         mesh=replace(mesh, positions=positions, normals=normals),
         skeleton=at_rest(figure.require_skeleton(), inner),
-        correctives=None,
-        blend_shapes=None,
     )
     rested = placed(posed, place)
     inverse = np.asarray(np.linalg.inv(rest_worlds(rested)), dtype=np.float64)
