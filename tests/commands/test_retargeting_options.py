@@ -55,6 +55,18 @@ def test_errors_in_a_map_are_reported_in_one_line(walk, tmp_path, capsys):
     assert not (tmp_path / "out.bvh").exists()
 
 
+def test_note_about_feet_far_from_the_ground_ends_when_they_are_moved_there(walk, capsys):
+    # The person stands 90 cm too low, as in motions whose origin is the hip.
+    head, _, _ = person(100.0).rpartition("\n0.000000 90")
+    rows = "\n".join(["0 " * 21] * 2)
+    walk.write_text(f"{head}\n{rows}\n")
+    assert convert(walk, "low.bvh") == 0
+    assert "below height 0, as those of walk do: --ground moves them" in capsys.readouterr().err
+    assert convert(walk, "ground.bvh", "--ground") == 0
+    told = capsys.readouterr()
+    assert "--ground" not in told.err and "body: raised by " in told.out
+
+
 def test_maps_without_effect_are_reported(walk, tmp_path, capsys):
     chosen = tmp_path / "map.txt"
     chosen.write_text("head = head\n")

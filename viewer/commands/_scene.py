@@ -191,7 +191,7 @@ def open_scene(options: SceneOptions) -> Scene:
     changes = options.changes
     scene, builders = begin_scene(options)
     for builder in builders:
-        finish(builder, scene)
+        finish(builder, scene, changes)
     if not changes.is_empty:
         clean(scene, changes, options.output)
         # Frames have this rate from now on.
@@ -209,8 +209,11 @@ def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
         print(note, file=stream)
 
 
-def finish(builder: Builder, scene: Scene) -> None:
-    """Read a capture to its end, with a progress bar in a terminal, and print warnings."""
+def finish(builder: Builder, scene: Scene, changes: CleanUp) -> None:
+    """Read a capture to its end, with a progress bar in a terminal, and print warnings.
+
+    ``changes``: what ``clean`` will do.
+    """
     notes: list[Diagnostic] = []
     with shown_progress(f"reading {builder.capture.name}"):
         while not builder.is_done:
@@ -218,8 +221,14 @@ def finish(builder: Builder, scene: Scene) -> None:
             scene.actors += new
             notes += said
             report(builder.n_read, builder.capture.n_frames, "frames")
+    notes = _unsolved(notes, changes)
     scene.diagnostics = (*scene.diagnostics, *notes)  # the window shows them too
     print_warnings(notes)
+
+
+def _unsolved(notes: Iterable[Diagnostic], changes: CleanUp) -> list[Diagnostic]:
+    """Return the notes whose remedy was not requested."""
+    return [each for each in notes if not (changes.grounds and each.key == "F007.feet-far")]
 
 
 def use_models(folder: str | None) -> None:
@@ -243,6 +252,7 @@ def begin_scene(options: SceneOptions) -> tuple[Scene, list[Builder]]:
         model = options.motion.model
         named = [*options.files, *([] if model is None else [model])]
         raise with_models(problem, named) from None
+    scene.diagnostics = tuple(_unsolved(scene.diagnostics, options.changes))
     print_warnings(scene.diagnostics)
     return scene, builders
 

@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
             to_stderr(text)
         start = asked.begin()
         for builder in start.builders:
-            finish(builder, start.scene)
+            finish(builder, start.scene, asked.scene.changes)
         box = bounding_box(start.points)
         from viewer.commands._scalar import choose_subject
         from viewer.commands.render import draw_scene
@@ -189,7 +189,7 @@ def _start(
     scene, builders = begin_scene(asked)
     if asked.frames.is_one or not asked.changes.is_empty:
         for builder in builders:
-            finish(builder, scene)  # determines who is present at that time
+            finish(builder, scene, asked.changes)  # determines who is present at that time
     clean(scene, asked.changes)
     print_warnings(apply_pose(scene, asked.pose, asked.frames))
     print_warnings(use_file_method(scene, options.skinning, given))
