@@ -198,7 +198,7 @@ def bones_inside(chain: Chain, lengths: Floats, solid: Solid) -> Floats:
         count = 2 + int((end - begin) / solid.spacing)
         way = at_lengths(chain.points, np.linspace(begin, end, count))
         if not is_bone_inside(solid, way[0], way[-1]):
-            apart = np.linalg.norm(way - _neareston_plane(way, way[0], way[-1]), axis=1)
+            apart = np.linalg.norm(way - _nearest_on(way, way[0], way[-1]), axis=1)
             if apart.max() <= _STRAIGHT * (end - begin):
                 continue  # the path itself is outside, and another joint would be, too
             middle = begin + (end - begin) * float(apart.argmax()) / (count - 1)
@@ -272,7 +272,7 @@ def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
         inner = path[first + 1 : last]
         if len(inner) == 0:
             continue
-        gaps = np.linalg.norm(inner - _neareston_plane(inner, path[first], path[last]), axis=1)
+        gaps = np.linalg.norm(inner - _nearest_on(inner, path[first], path[last]), axis=1)
         if gaps.max() > tolerance:
             middle = first + 1 + int(gaps.argmax())
             found.append(middle)
@@ -299,7 +299,7 @@ def _bends(path: Floats, tolerance: float, closest: float) -> list[int]:
     return found
 
 
-def _neareston_plane(points: Floats, start: Floats, end: Floats) -> Floats:
+def _nearest_on(points: Floats, start: Floats, end: Floats) -> Floats:
     """Return the points of a line from ``start`` to ``end`` that are nearest to others (N, 3)."""
     chord = end - start
     along = np.clip((points - start) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
