@@ -316,6 +316,9 @@ def test_arm_in_the_air_is_no_arm(person):
     found = bent(person, left_shoulder=[0.0, -90.0, 0.0])
     assert found["inside"].rating > 0.5
     assert found["bone"].value == 0.0 and found["bone"].rating == 0.0
+    assert str(found["bone"].line) == (
+        "only 0% of the bone that ends at left_wrist is inside the mesh"
+    )
     # Hands may be mittens, and feet stumps.
     assert bent(person, left_wrist=[0.0, -90.0, 0.0])["bone"].value == 1.0
 
@@ -355,6 +358,9 @@ def test_arms_that_end_early_are_those_of_a_hidden_arm(person, unit):
     shorter = 0.25 * sum(whole.values()) + 0.75 * whole["shoulder"]
     assert arms.value == pytest.approx(shorter / sum(whole.values()), rel=1e-3)
     assert arms.value < 0.5 and arms.rating < 0.5
+    # Arms may be that short in earnest.
+    assert f"the arms are only {arms.value:.2g} times as long as the template's" in refusal(found)
+    assert refusal(found).endswith("or keep the rig if it is right (--keep-doubtful)")
 
 
 def test_animal_with_a_low_head_is_no_person():

@@ -56,6 +56,7 @@ from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh, triangle_areas
 from viewer.rigs.pose import Pose
 from viewer.rigs.retargeting.mirror import joint_partners
+from viewer.rigs.skeleton import Skeleton, joint_label
 from viewer.rigs.skin import Skin
 from viewer.rigs.skinning import deform, joint_matrices
 from viewer.rigs.skinning.lbs import move
@@ -67,7 +68,7 @@ _SURE = 0.75  # confidence below which a rig may be wrong
 _FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
 _REMEDY = (
     "use a template of the same kind (--from) or none (--auto), specify --up, --facing or "
-    "--landmarks, or keep it (--keep-doubtful)"
+    "--landmarks, or keep the rig if it is right (--keep-doubtful)"
 )
 # Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
 # be apart; where none were found, only a shape that agrees everywhere shows that they are there.
@@ -108,6 +109,14 @@ class Finding:
     wrong: float
     good: float
     """Values that are rated 0 and 1."""
+    joint: str = ""
+    """Label of the joint that it is about, if the sentence has one."""
+
+    @property
+    def line(self) -> Diagnostic:
+        """Return the message about it."""
+        named = {"joint": self.joint} if self.joint else {}
+        return note(self.sentence, value=self.value, **named)
 
     @property
     def rating(self) -> float:
@@ -125,7 +134,7 @@ def remarks(found: tuple[Finding, ...]) -> Iterator[Diagnostic]:
     yield from doubts(found)
     near = sorted((each for each in found if each.rating < _SURE), key=lambda each: each.rating)
     if near and near[0].rating >= ENOUGH:
-        reasons = "; ".join(str(note(each.sentence, value=each.value)) for each in near)
+        reasons = "; ".join(str(each.line) for each in near)
         yield note(
             "R017.unsure: the rig may be wrong: {reasons}: check it in several poses",
             reasons=reasons,
@@ -136,7 +145,7 @@ def doubts(found: tuple[Finding, ...]) -> Iterator[Diagnostic]:
     """Return a message about each finding that says that the rig is wrong, the worst first."""
     for finding in sorted(found, key=lambda finding: finding.rating):
         if finding.rating < ENOUGH:
-            yield note(finding.sentence, value=finding.value)
+            yield finding.line
 
 
 def judge(
@@ -343,7 +352,7 @@ def _posture(
         found.append(leaning)
     heights = joints @ axis_direction(template.up)
     legs, arms = sorted(trunk, key=lambda pair: float(heights[list(pair)].sum()))
-    found += _limbs_inside(ours, theirs, parents, trunk)
+    found += _limbs_inside(ours, theirs, template.require_skeleton(), trunk)
     head = _head(parents, partners, heights, arms)
     is_upright = abs(np.cos(np.radians(angles[0]))) > _UPRIGHT
     standing = (legs,) if is_upright else trunk
@@ -359,8 +368,8 @@ def _posture(
     # In 60 rigs that are right, it is 0.84 and more. With arms that seem to end at the hips or the
     # chest, which they touch, or arms made of hair or of the brim of a hat, it is 0.36 to 0.71.
     arms_found = Finding(
-        "R017.arms: the arms have only {value:.2g} times their relative length in the template: "
-        "what they touch may hide the rest",
+        "R017.arms: the arms are only {value:.2g} times as long as the template's, relative to the "
+        "other bones: short ones, or some whose ends are hidden by what they touch",
         found_lengths / max(scale * own_lengths, 1e-12),
         wrong=0.3,
         good=0.85,
@@ -385,8 +394,8 @@ def _posture(
     # In 60 rigs that are right, it is 0.12 and more, 0.18 for a rabbit. With tufts of hair or lamps
     # of a helmet for arms, it is 0.01 to 0.08.
     low = Finding(
-        "R017.low: the head is only {value:.0%} of the trunk's length above the shoulders: the "
-        "arms may be hair or ears",
+        "R017.low: the head is only {value:.0%} of the trunk's length above the shoulders: it has "
+        "no neck, or the arms are hair or ears",
         own,
         wrong=0.0,
         good=0.2,
@@ -406,13 +415,14 @@ def _posture(
 
 
 def _limbs_inside(
-    template: Body, target: Body, parents: Ints, pairs: tuple[tuple[int, int], ...]
+    template: Body, target: Body, skeleton: Skeleton, pairs: tuple[tuple[int, int], ...]
 ) -> tuple[Finding, ...]:
     """Return a finding about the bone of a limb that is least inside, none without any.
 
     The last bones are left out: stumps have no toes, mittens no fingers. So are ears and tails, as
     not all animals have them.
     """
+    parents = skeleton.parents
     bones = _long_bones(parents, template)
     firsts = [joint for pair in pairs for joint in pair]
     in_limbs = np.any([descendants(parents, joint) for joint in firsts], axis=0)
@@ -425,14 +435,16 @@ def _limbs_inside(
     solid, points = target.solid, _points_on(target, bones)
     near = solid.gaps(points.reshape(-1, 3)).reshape(inside.shape) <= _BESIDE * solid.spacing
     parts = (near & inside).sum(axis=1) / inside.sum(axis=1)
+    least = int(parts.argmin())
     # Where an arm is not, as behind a gun that is taken for it, its bones are in the air, although
     # nearly all others are inside.
     return (
         Finding(
-            "R017.bone: only {value:.0%} of a bone is inside the mesh",
-            float(parts.min()),
+            "R017.bone: only {value:.0%} of the bone that ends at {joint} is inside the mesh",
+            float(parts[least]),
             wrong=0.2,
             good=0.6,
+            joint=joint_label(skeleton, int(bones[least, 1])),
         ),
     )
 
@@ -451,8 +463,8 @@ def _apart(
         ratios.append(float(gaps.min() / max(np.linalg.norm(joints[left] - joints[right]), 1e-12)))
     # People whose legs taper have 0.75 and more; with one leg missing, it is 0.3 to 0.5.
     return Finding(
-        "R017.apart: both legs are in the same place: only {value:.0%} of the width of the hips "
-        "apart",
+        "R017.apart: the legs are only {value:.0%} of the width of the hips apart: both may be in "
+        "the same one",
         min(ratios),
         wrong=0.2,
         good=0.7,
