@@ -34,7 +34,7 @@ from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.retargeting.drive import Drive
-from viewer.rigs.retargeting.driven_clip import driven_clip
+from viewer.rigs.retargeting.driven_clip import aligned_rests, driven_clip
 from viewer.rigs.retargeting.retarget import retarget
 
 CONVENTIONS = {
@@ -262,6 +262,8 @@ def test_figures_bound_in_another_pose_are_driven_from_their_t_or_a_pose(stands)
     drive = Drive(source, plants_feet=False, keeps_hands=False)
     wanted, found = (driven_clip(drive, each)[0].rotations for each in (figure, posed))
     same = np.abs(np.einsum("nja,nja->nj", found, wanted))
+    straight, shown = (aligned_rests(drive, each)[1] for each in (figure, posed))
+    assert np.allclose(shown, straight, rtol=0, atol=1e-9) == (not stands)
     if stands:
         # The neck is bound as the mesh has it, and so it stays.
         assert same[0].min() == pytest.approx(np.cos(0.15), abs=1e-12)

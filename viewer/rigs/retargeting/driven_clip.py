@@ -73,7 +73,8 @@ def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
     motion = with_source_rest(with_upright_rest(drive.motion), drive.source_rest)[0].figure
     axes = up_rotation(motion.up, figure.up)
     source = rest_of(motion.require_skeleton(), axes, figure.up).points
-    return source, rest_of(figure.require_skeleton(), np.eye(3), figure.up).points
+    target = with_standing_rest(figure).require_skeleton()
+    return source, rest_of(target, np.eye(3), figure.up).points
 
 
 def front_axes(points: Floats, matches: Matches, up: Up, is_source: bool) -> Floats:

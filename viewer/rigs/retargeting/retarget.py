@@ -80,8 +80,9 @@ def retarget(
     ``viewer.rigs.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
     spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
-    the same hierarchy and nearly the same rest pose, local rotations are copied unchanged. RigError
-    if too few joints match, the map names a missing joint, or a frame is missing.
+    the same hierarchy and nearly the same rest pose, or the same offsets in the axes of the
+    parents, local rotations are copied unchanged. RigError if too few joints match, the map names a
+    missing joint, or a frame is missing.
     """
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:

@@ -250,7 +250,10 @@ def _calibration(postures: Postures) -> tuple[int, float]:
 
 
 def _arm_angles(postures: Postures) -> tuple[list[Floats], list[Floats]]:
-    """Return angles (F,) of the bones of arms to the nearest T- or A-pose, and its own angles."""
+    """Return angles of the arms' bones to the nearest T- or A-pose, and how far it lowers the arms.
+
+    (F,) per bone, and per arm.
+    """
     left, up = postures.left(), postures.up
     angles, drops = list[Floats](), list[Floats]()
     for name, sign in zip(SIDES, (1.0, -1.0), strict=True):
