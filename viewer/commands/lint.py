@@ -85,8 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
             for name, code in known_codes().items()
         ]
         print("\n".join(table_lines(rows)))
-        for problem in used_checks()[1]:
-            raise problem
+        if failed := used_checks()[1]:
+            raise failed[0]
         return 0
     require_files(arguments.files, arguments.body, "lint")
     found = _checked(arguments)
