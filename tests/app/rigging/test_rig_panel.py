@@ -48,8 +48,8 @@ def test_without_a_target_mesh_only_adding_one_is_enabled(drive, texts):
     texts.clear()
     hand.step(2)
     assert (
-        "Every mesh in the scene has a rig: change it by Edit skeleton, or add a mesh without one, "
-        in " ".join(texts)
+        "Every mesh in the scene has a rig: change it with Edit skeleton, or add a mesh without "
+        "one, " in " ".join(texts)
     )
     for label in ("Align", "Run", "Compare methods", "rig tool move"):
         hand.click(label)
@@ -134,7 +134,7 @@ def test_joints_are_shown_while_the_template_is_fitted(rigging, monkeypatch):
 
     def fitting(*_):
         offer(FittedJoints(places, parents))
-        chosen.wait()
+        chosen.wait(60)
         offer(FittedJoints(places, parents, is_chosen=True))
         while not gate.wait(0.005):
             report(3, 10, "", "fitting limbs")

@@ -413,8 +413,8 @@ def no_target(state: AppState) -> str:
     if state.of(Rigging).target is not None:
         return ""
     return (
-        "every mesh in the scene has a rig: change it by Edit skeleton, or add a mesh without one, "
-        f"{one_of(MESHES)}"
+        "every mesh in the scene has a rig: change it with Edit skeleton, or add a mesh without "
+        f"one, {one_of(MESHES)}"
     )
 
 
