@@ -49,6 +49,7 @@ def test_time_poses_a_copy():
         ({"shading": 3}, '^shading: expected "auto" or "phong" or .*, found int'),
         ({"wire": True}, "^render: no option is called wire; did you mean .*allowed: background"),
         ({"sizes": (9, 9)}, "^render: no option is called sizes; did you mean size"),
+        ({"setting": 1}, "^render: no option is called setting; (?!did you mean settings)"),
         ({"wireframe": "yes"}, "^wireframe: expected True or False, found str"),
         ({"metallic": 2}, "^metallic: expected 0 to 1, found 2"),
         ({"isolines": 3}, "^isolines: expected True or False or None, found int"),

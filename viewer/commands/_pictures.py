@@ -272,7 +272,8 @@ def display_options(
     known = [each.name for each in dataclasses.fields(DisplayOptions)]
     for name, value in settings.items():
         if name not in known:
-            own = inspect.signature(function).parameters
+            named = inspect.signature(function).parameters.values()
+            own = [each.name for each in named if each.kind is not each.VAR_KEYWORD]
             near = did_you_mean(name, [*own, *known])
             raise ViewerError(
                 f"{function.__name__}: no option is called {printable(name, 60)}; "
