@@ -251,7 +251,8 @@ def test_target_with_huge_coordinates_is_refused(method):
         transfer(figure, pose, huge, TransferSettings(method=method))
     largest = float(np.abs(huge.positions).max())
     assert str(problem.value) == (
-        f"expected a target with coordinates up to 1e+09, found {largest:.3g}; scale the mesh"
+        f"expected a target with coordinates up to 1e+09, found {largest:.3g}; scale the mesh, or "
+        "delete what is so far away"
     )
 
 

@@ -35,7 +35,7 @@ def require_target(target: Mesh) -> None:
     if largest > FARTHEST:
         raise RigError(
             f"expected a target with coordinates up to {FARTHEST:g}, found {largest:.3g}; scale "
-            "the mesh"
+            "the mesh, or delete what is so far away"
         )
 
 
