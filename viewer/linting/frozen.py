@@ -12,6 +12,7 @@ from viewer.linting._subject import Subject, Track, track_of
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Floats, runs_of
 from viewer.rigs.geometry.quaternion import angles_between
+from viewer.rigs.geometry.vectors import lengths_of
 
 # A body that holds a pose slows down before, and speeds up again, one joint after another. Frames
 # that were written twice do not: most joints that move at all then stop within a frame, whether the
@@ -43,7 +44,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     if len(rows) < 2 * _FEWEST:
         return
     turns = angles_between(track.rotations[rows[1:]], track.rotations[rows[:-1]])
-    moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2) / track.size
+    moves = lengths_of(np.diff(track.positions[rows], axis=0)) / track.size
     known = track.present[rows[1:]] & track.present[rows[:-1]]
     # A root that travels with a held pose is not frozen, and one that lands stops within a frame.
     steps = np.where(known, turns.mean(axis=1), np.nan)

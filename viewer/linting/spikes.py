@@ -74,14 +74,14 @@ def _heights(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
 def _one_sided(
     points: Floats, surface: Surface, mirror: Mirror, heights: Floats, least: float
 ) -> Bools:
-    """Return which vertices were moved on one side of a symmetric mesh: (V,)."""
+    """Return which vertices, above ``least``, one side of a symmetric mesh has alone: (V,)."""
     (start, end), count = surface.edges.T, len(points)
     result = np.zeros(count, dtype=np.bool_)
     is_place = surface.place == np.arange(count)
     degree = np.bincount(start, minlength=count)
     known = np.bincount(start, mirror.known[end], minlength=count)
     alone = np.flatnonzero(is_place & ~mirror.known & (degree >= 3) & (known == degree))
-    for vertex in alone.tolist():
+    for vertex in alone[heights[alone] > least].tolist():
         other = _opposite(surface, mirror, vertex, alone)
         image = reflected(points[vertex], mirror.axis, mirror.centre)
         is_moved = other is not None and np.linalg.norm(points[other] - image) > least

@@ -150,13 +150,14 @@ def _taken(
     found: Support, points: Floats, places: Floats, parents: Ints, distances: Floats, size: float
 ) -> tuple[Taken, ...]:
     """Return what is moved around joints without weights by joints of another limb."""
-    result: list[tuple[int, int, Floats]] = []
+    result: list[tuple[int, int]] = []
+    far = np.flatnonzero(distances > _OTHER_LIMB)
     used = np.zeros(len(parents), dtype=np.bool_)
     used[found.joints] = True
     # Controls and helpers are below others without weights.
     for joint in np.flatnonzero(~used & (parents >= 0) & used[parents]).tolist():
-        near = bone_distances(places, parents, points, np.full(len(points), joint)) / size
-        rows = np.flatnonzero((distances > _OTHER_LIMB) & (near < _NEARER * distances))
+        near = bone_distances(places, parents, points[far], np.full(len(far), joint)) / size
+        rows = far[near < _NEARER * distances[far]]
         # Hands without weights of their own move with the arm, and fingers with the hand.
         above, below = with_ancestors(parents.tolist(), [joint]), descendants(parents, joint)
         rows = rows[~np.isin(found.joints[rows], [*above]) & ~below[found.joints[rows]]]
@@ -164,19 +165,22 @@ def _taken(
             continue
         taker = int(np.bincount(found.joints[rows], found.weights[rows]).argmax())
         if (found.weights[rows[found.joints[rows] == taker]] > _MOSTLY).sum() >= _TAKEN:
-            result.append((joint, taker, near))
-    nearest: dict[int, Floats] = {}
-    for _, taker, near in result:
-        nearest[taker] = np.minimum(nearest.get(taker, distances), near)
-    # Of several joints, each gets back what is nearest to it.
-    return tuple(
-        Taken(
-            joint,
-            taker,
-            np.flatnonzero((found.joints == taker) & (near < distances) & (near <= nearest[taker])),
-        )
-        for joint, taker, near in result
-    )
+            result.append((joint, taker))
+    taken: list[Taken] = []
+    for taker in {taker for _, taker in result}:
+        own = np.flatnonzero(found.joints == taker)
+        joints = [joint for joint, other in result if other == taker]
+        nearby = [
+            bone_distances(places, parents, points[own], np.full(len(own), joint)) / size
+            for joint in joints
+        ]
+        # Of several joints, each gets back what is nearest to it.
+        nearest = np.min([distances[own], *nearby], axis=0)
+        taken += [
+            Taken(joint, taker, own[(each < distances[own]) & (each <= nearest)])
+            for joint, each in zip(joints, nearby, strict=True)
+        ]
+    return tuple(sorted(taken, key=lambda one: one.joint))
 
 
 def _are_minor(found: Support, parts: Indices, distances: Floats) -> Bools:

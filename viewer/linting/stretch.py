@@ -11,6 +11,7 @@ from viewer.linting._subject import Indices, Subject, Track, track_of, travellin
 from viewer.phrases import counted, listed, rounded
 from viewer.rigs.arrays import Bools, Floats, largest_first
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.vectors import lengths_of
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.skeleton import Skeleton, joint_labels
 from viewer.rigs.skin import moves_vertices
@@ -32,7 +33,7 @@ def check(subject: Subject) -> Iterator[Finding]:
     bones[travelling_joints(track, skeleton)] = False
     moved = np.flatnonzero(bones & track.translations.any(axis=(0, 2)))
     own = track.translations[:, moved] + skeleton.rest_translations[moved]
-    lengths = np.linalg.norm(own, axis=2) / rest[moved]
+    lengths = lengths_of(own) / rest[moved]
     yield from _changed(
         subject,
         track,

@@ -11,9 +11,9 @@ from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject
 from viewer.linting._surface import FEWEST
 from viewer.phrases import agree, counted, listed
-from viewer.rigs.arrays import Floats
+from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
-from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.geometry.vectors import lengths_of, unit
 from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh, area_vectors
 from viewer.rigs.retargeting.joint_names import joint_meanings
@@ -49,14 +49,11 @@ def check(subject: Subject) -> Iterator[Finding]:
     places = bind_positions(figure.skin)
     lost: list[tuple[float, int]] = []
     blending: list[Indices] = []
-    equal: dict[int, Indices] = {}
+    equal = _equal(figure.mesh, whole, skeleton.parents)
     for joint, meaning in enumerate(joint_meanings(skeleton)):
         parent = int(skeleton.parents[joint])
         if parent < 0:
             continue
-        halves = _equal(figure.mesh, whole, joint, parent)
-        if len(halves):
-            equal[joint] = halves
         if meaning.endswith(_LIMBS):
             axis = places[joint] - places[parent]
             fraction, vertices = _twisted(figure, whole, joint, places[joint], axis)
@@ -95,18 +92,33 @@ def check(subject: Subject) -> Iterator[Finding]:
     )
 
 
-def _equal(mesh: Mesh, skin: Skin, joint: int, parent: int) -> Indices:
-    """Return the vertices with equal weights of a joint and its parent, if most of its are so."""
-    own, other = (
-        np.bincount(owners(skin), np.where(skin.joints == each, skin.weights, 0.0), skin.n_vertices)
-        for each in (joint, parent)
-    )
-    is_equal = (np.abs(own - other) < _SAME) & (own + other > _BOTH[0])
-    # A single ring, of which no triangle has all corners, is the middle of a transition.
-    are_equal = np.unique(mesh.triangles[is_equal[mesh.triangles].all(axis=1)])
-    n_own = np.count_nonzero((own > _BLENDS) & (own + other > _BOTH[1]))
-    is_usual = len(are_equal) < max(_FEWEST_EQUAL, _EQUAL * n_own)
-    return are_equal[: 0 if is_usual else None]
+def _equal(mesh: Mesh, skin: Skin, parents: Ints) -> dict[int, Ints]:
+    """Return the vertices with equal weights of a joint and its parent, of which most are so.
+
+    ``skin``: merged.
+    """
+    vertices, joints, own = owners(skin).astype(np.int64), skin.joints, skin.weights
+    keys = vertices * skin.n_joints + joints
+    order = np.argsort(keys, kind="stable")
+    # The weight of the parent at the same vertex; 0 if it has none there.
+    wanted = vertices * skin.n_joints + parents[joints]
+    at = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), max(len(keys) - 1, 0))]
+    is_there = (keys[at] == wanted) & (parents[joints] >= 0)
+    other = np.where(is_there, own[at], 0.0)
+    is_equal = is_there & (np.abs(own - other) < _SAME) & (own + other > _BOTH[0])
+    counts = (own > _BLENDS) & (own + other > _BOTH[1])
+    n_own = np.bincount(joints[counts], minlength=len(parents))
+    n_equal = np.bincount(joints[is_equal], minlength=len(parents))
+    result: dict[int, Ints] = {}
+    fewest = np.maximum(_FEWEST_EQUAL, _EQUAL * n_own)
+    for joint in np.flatnonzero(n_equal >= fewest).tolist():
+        halves = np.zeros(mesh.n_vertices, dtype=np.bool_)
+        halves[vertices[is_equal & (joints == joint)]] = True
+        # A single ring, of which no triangle has all corners, is the middle of a transition.
+        found = np.unique(mesh.triangles[halves[mesh.triangles].all(axis=1)])
+        if len(found) >= fewest[joint]:
+            result[joint] = found
+    return result
 
 
 def _twisted(
@@ -125,8 +137,8 @@ def _twisted(
     corners = mesh.positions[triangles] - centre
     along = unit(axis)
     middles = corners.mean(axis=1)
-    away = np.linalg.norm(middles - np.outer(middles @ along, along), axis=1)
-    volumes = away * np.linalg.norm(area_vectors(mesh.positions, triangles), axis=1)
+    away = lengths_of(middles - np.outer(middles @ along, along))
+    volumes = away * lengths_of(area_vectors(mesh.positions, triangles))
     parts = weights[triangles].mean(axis=1)
     lost = 2.0 * parts * (1.0 - parts) * (1.0 - np.cos(_ANGLE))
     total = float(volumes.sum())

@@ -15,9 +15,10 @@ import numpy as np
 from scipy.ndimage import percentile_filter
 
 from viewer.data_classes import dataclass
-from viewer.rigs.arrays import Bools, Floats, Ints, runs_of
+from viewer.rigs.arrays import Bools, Floats, Ints, blocks_of_rows, runs_of
 from viewer.rigs.feet import limits
 from viewer.rigs.feet.curves import falling
+from viewer.rigs.geometry.vectors import lengths_of
 
 # Percentage of the rows of a stride in which the faster foot is slower than where it swings.
 _SWINGING = 80
@@ -176,7 +177,7 @@ def _stands(
         half = np.maximum(1, np.round(0.5 * limits.WINDOW * rate / pace)).astype(np.int32)
         velocities = _mean_velocities(points, rate, half)
         rises = velocities @ up
-        slides = np.linalg.norm(velocities - rises[:, None] * up, axis=1) / (slips * pace)
+        slides = lengths_of(velocities - rises[:, None] * up) / (slips * pace)
         speeds = np.hypot(slides, rises)
         begins = (above < limits.LOW * size) & (speeds < limits.SLOW * size)
         lasts = (above < limits.HIGH * size) & (speeds < limits.FAST * size)
@@ -233,7 +234,7 @@ def along_ground(up: Floats) -> Floats:
 
 def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
-    return np.linalg.norm(_mean_velocities(places, rate, half_window(rate)), axis=1)
+    return lengths_of(_mean_velocities(places, rate, half_window(rate)))
 
 
 def _mean_velocities(places: Floats, rate: float, half: int | Ints) -> Floats:
@@ -301,28 +302,38 @@ def moving_ground(
         speeds = moved[lows[:, rows].argmin(axis=0), np.arange(len(rows))]
         near = limits.GROUND_SAME * size
         candidates = speeds[:: -(-len(speeds) // _MOST)]
-        counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
-        best = candidates[int(np.argmax(counts))]
-        velocity = np.median(speeds[np.linalg.norm(speeds - best, axis=1) < near], axis=0)
+        best = candidates[int(np.argmax(_neighbours(speeds, candidates, near)))]
+        velocity = np.median(speeds[lengths_of(speeds - best) < near], axis=0)
         speed = float(np.linalg.norm(velocity))
         body = rate * np.mean([_velocities(foot.hip, rows, half, up) for foot in feet], axis=0)
         drift = np.linalg.norm(body.mean(axis=0))
         is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
         # Feet of cycles that are animated by hand move less evenly than those on a treadmill.
         most = max(near, limits.GROUND_ALIKE * speed)
-        away = np.linalg.norm(speeds - velocity, axis=1)
+        away = lengths_of(speeds - velocity)
         is_alike = away < most
-        n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
+        n_resting = int((lengths_of(speeds) < near).sum())
         is_usual = is_alike.mean() > limits.GROUND_USUAL
         is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
         # People step with both feet, and deliver a blow with one.
-        steps = (np.linalg.norm(moved - velocity, axis=2) < most) & is_low[:, rows]
+        steps = (lengths_of(moved - velocity) < most) & is_low[:, rows]
         of_other = np.sort(steps.sum(axis=1))[-2:].min()
         is_usual &= of_other > limits.GROUND_OTHER_FOOT * is_alike.sum()
         if is_moving and is_usual:
             uneven = float(np.percentile(away[is_alike], _UNEVEN)) / near
             return MovingGround(velocity, 1.0 + min(uneven, 1.0))
     return None
+
+
+def _neighbours(points: Floats, places: Floats, near: float) -> Ints:
+    """Return the number of points (N, 3) that are within a distance of each place (M, 3): (M,)."""
+    # |p - q|^2 = |p|^2 + |q|^2 - 2 p . q, by one matrix product for many places.
+    squares, counts = (points * points).sum(axis=1), np.zeros(len(places), dtype=np.int32)
+    for part in blocks_of_rows(len(places), len(points)):
+        some = places[part]
+        away = squares - 2.0 * some @ points.T + (some * some).sum(axis=1)[:, None]
+        counts[part] = (away < near * near).sum(axis=1)
+    return counts
 
 
 def _lowest_velocities(foot: FootPath, rows: Ints, half: int, up: Floats) -> Floats:

@@ -71,10 +71,16 @@ def edges_of(corners: Ints | Indices) -> Edges:
     base = int(start.max(initial=0)) + 1
     keys = np.minimum(start, end) * base + np.maximum(start, end)
     forward = start < end
-    _, inverse, numbers = np.unique(keys, return_inverse=True, return_counts=True)
-    counts = numbers[inverse]
-    chosen = np.flatnonzero((counts == 2) & (start != end))
-    order = chosen[np.argsort(keys[chosen], kind="stable")].reshape(-1, 2)
+    # One sort shows the rows of each edge, which are next to each other in its order.
+    order = np.argsort(keys)
+    ordered = keys[order]
+    first = np.flatnonzero(np.diff(ordered, prepend=-1))
+    numbers = np.diff(first, append=len(keys))
+    counts = np.empty(len(keys), dtype=np.int64)
+    counts[order] = np.repeat(numbers, numbers)
+    first = first[numbers == 2]
+    order = np.sort(np.stack([order[first], order[first + 1]], axis=1), axis=1)
+    order = order[start[order[:, 0]] != end[order[:, 0]]]
     agree = forward[order[:, 0]] != forward[order[:, 1]]
     return Edges(keys, forward, counts, order // 3, agree)
 
