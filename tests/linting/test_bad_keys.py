@@ -185,6 +185,26 @@ def test_joint_that_turns_within_a_frame_is_found_unless_others_do(steps, codes)
         assert "rotates by 25° within frame 30" in one.message
 
 
+@pytest.mark.parametrize(("name", "n_found"), [("left_eye", 0), ("eyelid_l", 0), ("left_ear", 1)])
+def test_eyes_and_lids_may_turn_for_a_few_frames(name, n_found):
+    """A blink of three frames, by 40 degrees."""
+    skeleton = make_skeleton(("pelvis", "head", name), [-1, 0, 1], [[0, 1, 0]] * 3)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 3, 1))
+    turns[:, 1], turns[:, 2] = about_z(waving()), about_z(40.0 * ((K >= 30) & (K < 33)))
+    figure = Figure("face", skeleton=skeleton, unit="m")
+    actor = Actor(figure, clip=SampledClip("x", Timing(RATE, K), turns))
+    assert len([*pops.check(Subject(actor))]) == n_found
+
+
+@pytest.mark.parametrize(("rate", "n_found"), [(30.0, 1), (12.0, 0)])
+def test_pop_of_a_slow_recording_must_be_larger(rate, n_found):
+    """12 degrees are above 6 degrees for 1/30 s, but not above the 15 that 1/12 s leave to them."""
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    turns[:, 3] = about_z(waving() + 12.0 * (K == 30))
+    actor = Actor(arm(), clip=SampledClip("x", Timing(rate, K), turns))
+    assert len([*pops.check(Subject(actor))]) == n_found
+
+
 def nothing(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     pass
 
@@ -233,9 +253,22 @@ def walk(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
     moves[:, 0, 2] += 1.4 * K / RATE
 
 
+def wave_on_twos(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    """2.5 times a second, up to 25 degrees from one drawing to the next; each is held."""
+    bends[:] = 40.0 + 25.0 * np.sin(2.0 * np.pi * (K // 2 * 2) / 12.0)
+
+
+def wave_on_threes(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+    bends[:] = 40.0 + 25.0 * np.sin(2.0 * np.pi * (K // 3 * 3) / 15.0)
+
+
 @pytest.mark.parametrize("is_captured", [False, True])
 @pytest.mark.parametrize(
-    "change", [nothing, strike, strike_and_stop, swing, hold, snap, flap, straighten, walk]
+    "change",
+    [
+        *(nothing, strike, strike_and_stop, swing, hold, snap, flap, straighten, walk),
+        *(wave_on_twos, wave_on_threes),
+    ],
 )
 def test_sound_motion_has_no_finding(change, is_captured):
     assert linted(change, is_captured) == []

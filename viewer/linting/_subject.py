@@ -29,7 +29,7 @@ from viewer.rigs.feet.soles import soles_of, soles_of_feet
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import align_signs, multiply
 from viewer.rigs.geometry.transform import apply_transform, mean_scale
-from viewer.rigs.geometry.vectors import Up, axis_vector
+from viewer.rigs.geometry.vectors import Up, axis_vector, lengths_of
 from viewer.rigs.hierarchy import path_to_root
 from viewer.rigs.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rigs.mesh import bounding_box, box_size
@@ -56,6 +56,8 @@ _PROP = 0.1  # relative size of a skeleton below which its mesh determines the s
 _MOST_JOINTS = 0.5  # minimum fraction of the joints that are below one that carries the body
 _STAYS = 1e-3  # relative distance up to which a translation is rounding
 _QUADRUPED = 4  # number of legs
+_POSES = 3  # minimum number of changes between held poses that are a motion
+_ROUNDING = 1e-6  # relative movement up to which a pose is held
 # Frames
 _TOGETHER = 1000  # frames per batch, which limits the memory for their matrices
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
@@ -239,6 +241,14 @@ class Track:
     def on_frames(self) -> Indices:
         """Return the rows at the frames of the file: (N,)."""
         return np.arange(0, len(self.times), self.per_frame)
+
+    def is_blocked(self) -> bool:
+        """Return whether all poses are held, as animators block a motion, or draw it on twos."""
+        steps = lengths_of(np.diff(self.positions[self.on_frames()], axis=0)).max(axis=1)
+        changes = steps > _ROUNDING * self.size
+        is_held = not (changes[1:] & changes[:-1]).any()
+        # A body at rest that is displaced, and maybe returns, is not blocked.
+        return is_held and int(changes.sum()) >= _POSES
 
     def turns(self, rows: Indices) -> Floats:
         """Return the rotations of rows without changes of sign between them: (N, J, 4)."""

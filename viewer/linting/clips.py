@@ -24,6 +24,7 @@ from viewer.linting.pops import shifts
 from viewer.phrases import counted, listed
 from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.geometry.quaternion import angles_between
+from viewer.rigs.geometry.vectors import lengths_of
 from viewer.rigs.motion.clip import SHORTEST, Clip, evaluate_all
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.posing.dof_text import beyond_text
@@ -33,7 +34,6 @@ _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
 _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
 _BESIDE = 4  # number of steps before and after for which a pose is held
-_POSES = 3  # minimum number of changes between held poses that are a motion
 # A body that is displaced keeps its pose; one that takes another pose between two that are held is
 # blocked, even where the rest of the motion is not.
 _OTHER_POSE = math.radians(2.0)  # smallest rotation of a joint that takes another pose
@@ -146,18 +146,18 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     if limit == 0.0:  # a single joint without a mesh has no size
         return
     speeds = np.zeros((len(track.times), skeleton.n_joints))
-    steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
+    steps = lengths_of(np.diff(track.positions, axis=0))
     speeds[1:] = steps / np.diff(track.times)[:, None]
     speeds[track.stepped] = 0.0
     fast = _too_fast(track, speeds, limit)
     if fast is None and given is None:
-        if _is_blocked(track):
+        if track.is_blocked():
             return
         limit = _LEAPS * track.size
         rows = track.on_frames()
         flat = [axis for axis in range(3) if axis != (2 if subject.up == "z" else 1)]
         # Between frames, a keyed clip would show one jump as several steps.
-        steps = np.linalg.norm(np.diff(track.positions[rows][..., flat], axis=0), axis=2)
+        steps = lengths_of(np.diff(track.positions[rows][..., flat], axis=0))
         leaps = _leaps(
             steps / np.diff(track.times[rows])[:, None], travelling_joints(track, skeleton)
         )
@@ -209,19 +209,9 @@ def _steps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Findi
     )
 
 
-def _is_blocked(track: Track) -> bool:
-    """Return whether all poses are held: stepped on purpose, as animators block a motion."""
-    rows = track.on_frames()
-    moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2).max(axis=1)
-    changes = moves > _ROUNDING * track.size
-    is_held = not (changes[1:] & changes[:-1]).any()
-    # A body at rest that is displaced, and maybe returns, is not blocked.
-    return is_held and int(changes.sum()) >= _POSES
-
-
 def _poses(track: Track, rows: Indices) -> Bools:
     """Return which steps between rows lead from one held pose to another: (N - 1,)."""
-    moves = np.linalg.norm(np.diff(track.positions[rows], axis=0), axis=2).max(axis=1)
+    moves = lengths_of(np.diff(track.positions[rows], axis=0)).max(axis=1)
     angles = angles_between(track.rotations[rows[1:]], track.rotations[rows[:-1]])
     changes = (moves > _ROUNDING * track.size) | (angles > _ROUNDING).any(axis=1)
     around = [k for k in range(-_BESIDE, _BESIDE + 1) if k != 0]

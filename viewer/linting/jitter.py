@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from viewer.linting._finding import Finding
-from viewer.linting._subject import Subject, track_of
+from viewer.linting._subject import Subject, Track, track_of
 from viewer.phrases import counted, rounded
 from viewer.rigs.arrays import Bools, Floats, largest_first, runs_of
 from viewer.rigs.captures.points import PointClip, visible_size
-from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.geometry.vectors import lengths_of
+from viewer.rigs.skeleton import Skeleton, joint_labels
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
 _POINT_LIMIT = 0.02  # noise relative to the median size: triangulated points are noisier
@@ -41,12 +42,11 @@ def check(subject: Subject) -> Iterator[Finding]:
     if clip is not None and clip.points is not None:
         yield from _points(subject, clip)
         return
-    yield from _rotations(subject)
-    if clip is None or clip.frame_rate < _SLOWEST:
+    track, skeleton = track_of(subject), subject.actor.figure.skeleton
+    if track is None or skeleton is None or track.is_blocked():
         return
-    track = track_of(subject)
-    skeleton = subject.actor.figure.skeleton
-    if track is None or skeleton is None or not track.size > 0.0:
+    yield from _rotations(subject, track, skeleton)
+    if clip is None or clip.frame_rate < _SLOWEST or not track.size > 0.0:
         return
     width, limit = _width(clip.timing.frame_rate), _LIMIT * track.size
     noise = noise_of(track.positions, track.present, width)
@@ -64,11 +64,8 @@ def check(subject: Subject) -> Iterator[Finding]:
     yield from _found(subject, noise, limit, labels, shown, track.numbers, track.times)
 
 
-def _rotations(subject: Subject) -> Iterator[Finding]:
+def _rotations(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
     """Report joints whose rotations are much noisier than those of the others."""
-    track, skeleton = track_of(subject), subject.actor.figure.skeleton
-    if track is None or skeleton is None:
-        return
     rows = track.on_frames()
     if len(rows) < 2:
         return
@@ -198,7 +195,7 @@ def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
             end = min(start + _TOGETHER + width + 4, stop)
             if end - start < width + 4:
                 continue
-            lengths = np.linalg.norm(_fourth(positions[start:end]), axis=-1)
+            lengths = lengths_of(_fourth(positions[start:end]))
             # A step or a jump makes up to five large differences per window. A low quantile of the
             # window does not see them; the mean would.
             windows = np.lib.stride_tricks.sliding_window_view(lengths, width, axis=0)

@@ -12,8 +12,10 @@ from viewer.linting._finding import Finding
 from viewer.linting._subject import Indices, Subject, Track, track_of, travelling_joints
 from viewer.phrases import counted
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.vectors import lengths_of
 from viewer.rigs.inspection.faults import distinct
-from viewer.rigs.skeleton import joint_labels
+from viewer.rigs.retargeting.joint_names import joint_meanings, name_tokens
+from viewer.rigs.skeleton import Skeleton, joint_labels
 
 # A value that leaves a smooth path by a for n frames, and returns, adds a box of height a to it,
 # and nothing around; one that stays off adds a step. Differences of the values leave little of a
@@ -38,6 +40,8 @@ _AROUND = 8  # differences before and after that are compared
 _SEEN = 2  # minimum number of frames before and after
 _ANGLE = math.radians(6.0)  # smallest rotation that is seen as a pop
 _DISTANCE = 0.04  # the same of a travelling joint, relative to its size: 70 mm for a person
+_RATE = 30.0  # frames per second below which a body does more within a frame than these
+_LIDS = {"eyelid", "eyelids", "lid", "lids", "blink"}
 
 
 @dataclass(frozen=True)
@@ -83,12 +87,14 @@ def check(subject: Subject) -> Iterator[Finding]:
     if track is None or skeleton is None or not track.size > 0.0:
         return
     rows = track.on_frames()
-    if len(rows) < 2 * _AROUND:
+    if len(rows) < 2 * _AROUND or track.is_blocked():
         return
     known, joints = _known(track, rows), np.arange(skeleton.n_joints)
+    known[:, _blinks(skeleton)] = False
+    longer = _longer(track, rows)
     # Close to each other, unit quaternions are half the angle of their rotation apart.
     turns = 2.0 * track.turns(rows)
-    found = _found(turns, known, _POPS, _ANGLE)
+    found = _found(turns, known, _POPS, _ANGLE * longer)
     if found is not None:
         yield _finding(
             subject,
@@ -98,7 +104,7 @@ def check(subject: Subject) -> Iterator[Finding]:
             "and back",
             f"{math.degrees(found.size):.0f}°",
         )
-    found = _alone(_found(turns, known, _STEPS, _ANGLE), turns)
+    found = _alone(_found(turns, known, _STEPS, _ANGLE * longer), turns)
     if found is not None:
         yield _finding(
             subject,
@@ -110,7 +116,7 @@ def check(subject: Subject) -> Iterator[Finding]:
         )
     carriers = travelling_joints(track, skeleton)
     places = track.positions[rows][:, carriers]
-    found = _found(places, known[:, carriers], _POPS, _DISTANCE * track.size)
+    found = _found(places, known[:, carriers], _POPS, _DISTANCE * longer * track.size)
     if found is not None:
         yield _finding(
             subject,
@@ -129,7 +135,8 @@ def shifts(track: Track, rows: Indices, joints: Ints, is_step: Bools) -> OffPath
     """
     known = _known(track, rows)[:, joints]
     known[1:] &= is_step[:, None]
-    found = _found(track.positions[rows][:, joints], known, _STEPS, _DISTANCE * track.size)
+    least = _DISTANCE * _longer(track, rows) * track.size
+    found = _found(track.positions[rows][:, joints], known, _STEPS, least)
     return None if found is None else found.of(rows, joints)
 
 
@@ -180,9 +187,7 @@ def _found(
     orders = sorted({1, *(shape.order for shape in shapes)})
     differences = {order: np.diff(values, n=order, axis=0) for order in orders}
     ends = ((_AROUND + 1, _AROUND + _LONGEST), (0, 0))
-    lengths = {
-        order: np.pad(np.linalg.norm(each, axis=2), ends) for order, each in differences.items()
-    }
+    lengths = {order: np.pad(lengths_of(each), ends) for order, each in differences.items()}
     each = [
         _matches(values, differences[shape.order], lengths, known, shape, least) for shape in shapes
     ]
@@ -229,7 +234,7 @@ def _matches(
     # By least squares, the size is that of the projection onto the pattern.
     windows = differences[rows[:, None] + np.arange(len(pattern)), columns[:, None]]
     factors = np.einsum("npc,p->nc", windows, pattern) / (pattern @ pattern)
-    left = np.linalg.norm(windows - factors[:, None] * pattern[:, None], axis=2).max(axis=1)
+    left = lengths_of(windows - factors[:, None] * pattern[:, None]).max(axis=1)
     size = np.linalg.norm(factors, axis=1)
 
     def most(order: int, at: Indices, shifts: range) -> Floats:
@@ -265,17 +270,33 @@ def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
     if found is None:
         return None
     # Half a third difference is the edge of a step: x = 0 0 1 1 has -2 = 1 - 3.
-    edges = 0.5 * np.linalg.norm(np.diff(values, n=3, axis=0), axis=2)
+    edges = 0.5 * lengths_of(np.diff(values, n=3, axis=0))
     firsts = np.array([int(frames[0]) for frames in found.frames])
     others = edges[firsts - 2]
     others[np.arange(len(firsts)), found.columns] = 0.0
-    moving = np.linalg.norm(np.diff(values, axis=0), axis=2)[firsts - 1] > _MOVES
+    moving = lengths_of(np.diff(values, axis=0))[firsts - 1] > _MOVES
     go_on = moving.sum(axis=1) - 1 >= _GO_ON
     keep = np.flatnonzero(go_on & (others.max(axis=1) < _ALONE * found.sizes))
     if len(keep) == 0:
         return None
     each = tuple(found.frames[k] for k in keep.tolist())
     return OffPath(found.sizes[keep], each, found.columns[keep])
+
+
+def _longer(track: Track, rows: Indices) -> float:
+    """Return by how much frames are longer than those for which the smallest sizes are meant."""
+    return max(1.0, _RATE * float(track.times[rows[1]] - track.times[rows[0]]))
+
+
+def _blinks(skeleton: Skeleton) -> Bools:
+    """Return the joints that dart within a frame, or close for some frames: eyes and lids (J,)."""
+    meanings = joint_meanings(skeleton)
+    return np.array(
+        [
+            meaning.endswith("eye") or bool(_LIDS & set(name_tokens(name)))
+            for meaning, name in zip(meanings, skeleton.names, strict=True)
+        ]
+    )
 
 
 def _known(track: Track, rows: Indices) -> Bools:
