@@ -169,7 +169,7 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         **called,
         length=length_text(figure, abs(changes.ground)),
         below="below" if changes.ground < 0.0 else "above",
-        remedy=Remedy("", ": --ground moves them there"),
+        remedy=Remedy("", "; --ground of viewer view, render and convert moves them there"),
     )
     if not changes.is_better:
         key = (
