@@ -369,7 +369,7 @@ def _posture(
     # chest, which they touch, or arms made of hair or of the brim of a hat, it is 0.36 to 0.71.
     arms_found = Finding(
         "R017.arms: the arms are only {value:.2g} times as long as the template's, relative to the "
-        "other bones: short ones, or some whose ends are hidden by what they touch",
+        "other bones (they are short, or what they touch hides their ends)",
         found_lengths / max(scale * own_lengths, 1e-12),
         wrong=0.3,
         good=0.85,
@@ -394,8 +394,8 @@ def _posture(
     # In 60 rigs that are right, it is 0.12 and more, 0.18 for a rabbit. With tufts of hair or lamps
     # of a helmet for arms, it is 0.01 to 0.08.
     low = Finding(
-        "R017.low: the head is only {value:.0%} of the trunk's length above the shoulders: it has "
-        "no neck, or the arms are hair or ears",
+        "R017.low: the head is only {value:.0%} of the trunk's length above the shoulders (it has "
+        "no neck, or the arms are hair or ears)",
         own,
         wrong=0.0,
         good=0.2,
@@ -406,7 +406,7 @@ def _posture(
     # People with outstretched arms have about 0; a rabbit with its ears for arms has 0.2 to 0.3.
     raised = Finding(
         "R017.head: the middle of the arms is {value:.0%} of the trunk's length above head and "
-        "shoulders: they may be ears",
+        "shoulders (they may be ears)",
         rises[1][0] - max(rises[1][1:]),
         wrong=0.2,
         good=0.0,
@@ -463,8 +463,8 @@ def _apart(
         ratios.append(float(gaps.min() / max(np.linalg.norm(joints[left] - joints[right]), 1e-12)))
     # People whose legs taper have 0.75 and more; with one leg missing, it is 0.3 to 0.5.
     return Finding(
-        "R017.apart: the legs are only {value:.0%} of the width of the hips apart: both may be in "
-        "the same one",
+        "R017.apart: the legs are only {value:.0%} of the width of the hips apart (both may be in "
+        "the same one)",
         min(ratios),
         wrong=0.2,
         good=0.7,
