@@ -400,6 +400,11 @@ def test_joints_without_sides_in_their_names_are_compared_by_place():
     assert found.joints.tolist() == named.joints.tolist()
 
 
+def test_a_joint_bound_elsewhere_has_one_finding():
+    subject = Subject(Actor(bound_elsewhere()))
+    assert [found.diagnostic.key for found in bindings.check(subject)] == ["B007.places"]
+
+
 def test_joint_without_weights_beside_another_limb_is_a_helper():
     """A hand without weights moves with the arm."""
     assert linted(taken(("left_wrist",), "left_elbow"), (stray_weights,)) == []

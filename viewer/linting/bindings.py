@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from viewer.rigs.arrays import Bools, Floats, Ints, largest_first
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import angles_of_pairs, nearest_rotations
 from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.inspection.faults import are_usable, bind_faults
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import rest_pose
@@ -37,17 +38,26 @@ def check(subject: Subject) -> Iterator[Finding]:
         return
     yield from subject.faults(bind_faults(figure, subject.invalid))
     usable = subject.valid("bindings", figure.skin.n_joints) & are_usable(figure.skin)
-    yield from _elsewhere(subject, figure, usable)
+    shifted = [*_shifted(subject, figure, usable)]
+    named = [joint for found in shifted for joint in found.joints.tolist()]
+    yield from _elsewhere(subject, figure, usable, named)
     yield from _rotated(subject, figure, usable)
-    yield from _shifted(subject, figure, usable)
+    yield from shifted
 
 
-def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
-    """Compare the joints' bind positions with those of the skeleton."""
+def _elsewhere(
+    subject: Subject, figure: Figure, usable: Bools, named: Sequence[int]
+) -> Iterator[Finding]:
+    """Compare the joints' bind positions with those of the skeleton.
+
+    ``named``: joints of another finding, which move those below them.
+    """
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return
     known = _placed(subject, skeleton) & usable
+    for joint in named:
+        known &= ~descendants(skeleton.parents, joint)
     matrices = np.where(usable[:, None, None], skin.inverse_bind, np.eye(4))
     bound = np.linalg.inv(matrices)[:, :3, 3]
     own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
