@@ -165,7 +165,10 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
     is_far = abs(changes.ground) > _FAR * changes.size
     far = note(
         "F007.feet-far: feet of {figure} stand {length} {below} height 0, as those of {motion} "
-        "do{remedy}",
+        "do{remedy}"
+        if changes.n_contacts
+        else "F007.feet-far-lowest: feet of {figure} are {length} {below} height 0 at their "
+        "lowest, as those of {motion} are{remedy}",
         **called,
         length=length_text(figure, abs(changes.ground)),
         below="below" if changes.ground < 0.0 else "above",
