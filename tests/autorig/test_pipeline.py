@@ -10,14 +10,17 @@ from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
-from viewer.autorig.rigged import clip_for
+from viewer.autorig.rigged import clip_for, start_of_clips
 from viewer.autorig.settings import METHODS, TransferSettings
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
 from viewer.progress import Cancelled, receiving
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.geometry.transform import apply_transform
 from viewer.rigs.motion.clip import Channel, Clip
+from viewer.rigs.motion.sampled_clip import SampledClip
+from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, pose_actors
 from viewer.rigs.skinning import deform, joint_matrices
@@ -78,6 +81,48 @@ def test_rigged_result_reproduces_the_target_pose(transferred):
     assert rigged.confidence.tolist() == [0] * target.n_vertices
 
 
+def test_rigged_figure_is_at_rest_in_the_pose_of_the_target(transferred):
+    _, _, target, rigged = transferred
+    found = figure_pose(rigged.figure)
+    assert_allclose(found.dofs[6:], [0.2, -0.1, 0.7], atol=1e-6)
+    at_rest = deform(rigged.figure, found)[0]
+    # Of the rotation, only what is not from axis to axis is part of the rest pose: a quarter turn
+    # about y is nearest to 2 radians.
+    quarter = turn([0, 1, 0], np.pi / 2)
+    middle = target.positions.mean(axis=0)
+    expected = (target.positions - middle) @ quarter
+    assert_allclose(at_rest - at_rest.mean(axis=0), expected, atol=1e-10)
+
+
+def test_pose_beyond_limits_widens_them():
+    figure, pose = bent_arm()
+    tight = np.where(np.arange(9)[:, None] < 6, [-np.inf, np.inf], [-0.1, 0.1])
+    limited = replace(figure, skeleton=replace(figure.skeleton, dof_limits=tight))
+    still = AlignmentSettings(matrix=np.eye(4))
+    target = mesh_of(deform(figure, pose)[0], figure.mesh.triangles)
+    rigged = transfer(limited, pose, target, TransferSettings(alignment=still, fits=False))
+    assert_allclose(
+        rigged.figure.skeleton.dof_limits[6:], [[-0.1, 0.2], [-0.1, 0.1], [-0.1, 0.7]], atol=1e-6
+    )
+    assert_allclose(figure_pose(rigged.figure).dofs, rigged.pose.dofs, atol=0)
+
+
+def test_frames_of_a_template_whose_joints_are_displaced_are_transferred():
+    figure, pose = bent_arm()
+    pose.translations[:] = [0.3, 0.1, 0.0], [0.0, 0.2, 0.1]
+    target = mesh_of(deform(figure, pose)[0], figure.mesh.triangles)
+    still = AlignmentSettings(matrix=np.eye(4))
+    rigged = transfer(figure, pose, target, TransferSettings(alignment=still, fits=False))
+    rotations = matrix_to_quaternion(np.stack([turn([1, 0, 0], 0.3), turn([0, 0, 1], 0.6)]))
+    for moves in (None, np.array([[[0.1, 0.0, 0.2], [0.0, -0.1, 0.0]]])):
+        clip = SampledClip("one", Timing(30.0, np.arange(1)), rotations[None], translations=moves)
+        one = Actor(figure, clip=clip)
+        other = Actor(rigged.figure, start_of_clips(rigged), clip_for(rigged, clip))
+        pose_actors([one, other], 0.0)
+        expected = deform(figure, one.pose)[0]
+        assert_allclose(deform(rigged.figure, other.pose)[0], expected, atol=1e-4)
+
+
 def test_target_is_not_modified_and_keeps_its_texture_coordinates(transferred):
     figure, pose, target, _ = transferred
     uvs = np.random.default_rng(2).random((target.n_vertices, 2))
@@ -121,7 +166,8 @@ def test_clip_of_the_template_is_transferred(transferred):
     rows = [(0, 0.5), (4, 0.8), (8, -1.1)]
     channels = tuple(Channel(dof, times, np.array([0.0, value]), linear) for dof, value in rows)
     clip = Clip("wave", channels, 0.0, 1.0)
-    one, other = Actor(figure, clip=clip), Actor(rigged.figure, clip=clip_for(rigged, clip))
+    one = Actor(figure, clip=clip)
+    other = Actor(rigged.figure, start_of_clips(rigged), clip_for(rigged, clip))
     for actor in (one, other):
         pose_actors([actor], 0.6)
     expected = 30.0 * deform(figure, one.pose)[0]
@@ -185,7 +231,9 @@ def test_nearest_method_uses_weights_of_the_nearest_vertex():
     assert rigged.figure.skin.weights.tolist() == figure.skin.weights.tolist()
     assert_allclose(np.diag(rigged.placement), [4.0, 2.0, 3.0, 1.0])
     assert_allclose(again(rigged), target.positions, atol=1e-10)
-    assert rigged.figure.skeleton is figure.skeleton
+    joints = rigged.figure.skeleton
+    assert_allclose(joints.rest_translations, figure.skeleton.rest_translations, atol=0)
+    assert_allclose(joints.rest_dofs, pose.dofs, atol=0)
     assert rigged.lines[0].key == "R001.boxes"
     assert rigged.lines[0].values == pytest.approx({"x": 0.25, "y": 0.5, "z": 1.0 / 3.0})
 

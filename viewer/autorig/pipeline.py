@@ -23,7 +23,7 @@ from viewer.autorig.checks import (
 )
 from viewer.autorig.confidence import judge, refusal, remarks
 from viewer.autorig.correspondence import Template, with_reversed_winding
-from viewer.autorig.rigged import Rigged, with_fields
+from viewer.autorig.rigged import Rigged, as_found, with_fields
 from viewer.autorig.seed import nearest
 from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
@@ -68,7 +68,7 @@ def transfer(
         bound = bind(template, pose, target, how, name)
         report_fraction(1.0, "done")
         dropped = _dropped_parts(template, bound.figure, replace(how, correctives=False))
-        return replace(bound, lines=(*bound.lines, *dropped))
+        return as_found(replace(bound, lines=(*bound.lines, *dropped)))
     if not template.is_attached:
         raise RigError(
             f"{template.name}: expected a template with mesh, skeleton and skin, found "
@@ -83,7 +83,7 @@ def transfer(
     else:
         rigged = robust(figure, plain, target, how, name)
     report_fraction(1.0, "done")
-    return with_fields(rigged)
+    return as_found(with_fields(rigged))
 
 
 def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:

@@ -6,18 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.autorig.alignment.orientation_search import axis_rotations
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.confidence import Finding
+from viewer.autorig.transfer.rest_skeleton import rotate_roots
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Bools, Floats, Ints
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
+from viewer.rigs.joint_edits import at_rest
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.motion.sampled_clip import SampledClip
-from viewer.rigs.pose import Pose
+from viewer.rigs.pose import Pose, rest_pose
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 _CONFIDENCE = ("matched", "inpainted", "rigid")
@@ -30,7 +33,8 @@ class Rigged:
     """A target mesh that was rigged."""
 
     figure: Figure
-    """The target at rest, with its texture coordinates and materials."""
+    """The target, with its texture coordinates and materials; ``as_found`` puts it at rest in the
+    pose of the target."""
     pose: Pose
     """The pose that reproduces the target."""
     placement: Floats
@@ -57,6 +61,8 @@ class Rigged:
     place for a part of a figure."""
     max_influences: int | None = None
     """Limit of the influences per vertex that was requested; None for none."""
+    template_rest: Pose | None = None
+    """The template's rest pose, from which its motions start; None if it is the figure's."""
 
     @property
     def confidence(self) -> Ints:
@@ -81,12 +87,50 @@ def with_fields(
     return replace(rigged, figure=replace(rigged.figure, fields=fields))
 
 
+def as_found(rigged: Rigged) -> Rigged:
+    """Return a copy whose figure is at rest in the pose of the target, along its own up axis.
+
+    Motions are retargeted from the rest pose: in that of the target, head, hands and feet are held
+    as in a standing pose, whatever the fit rotated to get there. The figure stays bound in the
+    template's bind pose, and angles stay relative to the template's, so that pose correctives,
+    poses and clips of the template remain valid.
+    """
+    figure, pose = rigged.figure, rigged.pose.copy()
+    template = rest_pose(figure.require_skeleton())
+    if np.array_equal(template.values, pose.values):
+        return rigged
+    template.translations[:] = -pose.translations
+    rest, skeleton = pose.copy(), figure.require_skeleton()
+    if rigged.alignment is not None:
+        # A mesh may have another up axis than the template, along which the figure stands.
+        rotation = rigged.alignment.similarity.rotation
+        axes = max(axis_rotations(figure.up), key=lambda axes: float((axes * rotation).sum()))
+        skeleton, _ = rotate_roots(skeleton, rest, axes.T)
+    rested = replace(figure, skeleton=at_rest(skeleton, rest))
+    pose.translations[:] = 0.0
+    return replace(rigged, figure=rested, pose=pose, template_rest=template)
+
+
+def start_of_clips(rigged: Rigged) -> Pose:
+    """Return the pose of the figure that clips of ``clip_for`` change: the template's at rest."""
+    found = rigged.template_rest
+    return figure_pose(rigged.figure) if found is None else found.copy()
+
+
 def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     """Return a clip of the template for the rigged figure; see ``transfer_clip``."""
     skeleton = rigged.figure.require_skeleton()
-    return transfer_clip(
+    found = transfer_clip(
         clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale
     )
+    # Frames are relative to the rest translations, which are those of the target's pose.
+    shifts = start_of_clips(rigged).translations
+    if found.kind == "curves" or not shifts.any():
+        return found
+    moves = found.translations
+    if moves is None:
+        moves = np.zeros((*found.rotations.shape[:2], 3))
+    return replace(found, translations=moves + shifts)
 
 
 def transfer_clip(

@@ -27,7 +27,7 @@ from viewer.autorig.checks import FARTHEST
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.decomposition import DecompositionSettings
 from viewer.autorig.pipeline import transfer
-from viewer.autorig.rigged import Rigged, clip_for
+from viewer.autorig.rigged import Rigged, clip_for, start_of_clips
 from viewer.autorig.settings import BINDING, SkeletonSettings, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
@@ -759,7 +759,7 @@ def _write_clips(rigged: Rigged, clips: list[_TransferredClip]) -> list[Diagnost
     """Write the template's motions for the rigged figure; return notes about the files."""
     notes: list[Diagnostic] = []
     for each in clips:
-        actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))
+        actor = Actor(rigged.figure, start_of_clips(rigged), clip_for(rigged, each.clip))
         options = ExportOptions(kind=each.path.suffix[1:])
         part = sampled(options.kind, options, Scene([actor]), actor)
         notes += export(Selection([part]), each.path, options=options)

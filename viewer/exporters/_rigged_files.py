@@ -79,8 +79,8 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
         if is_vrm and _is_moved(figure, rigged.pose):
             notes.append(
                 Diagnostic(
-                    "X003.rigged-vrm-pose: the figure is in the template's rest pose, at the "
-                    "origin: .npz, .skel, .glb and .gltf show it as the mesh is"
+                    "X003.rigged-vrm-place: the figure is at the origin, not where the mesh is, as "
+                    "it is in .glb and .gltf"
                 )
             )
         notes += limited

@@ -114,9 +114,11 @@ def prepared(figure: Figure) -> tuple[Figure, list[str]]:
 
 
 def at_rest(skeleton: Skeleton, pose: Pose) -> Skeleton:
-    """Return a skeleton whose rest pose is a given one."""
+    """Return a skeleton whose rest pose is a given one; its limits are widened to include it."""
+    low, high = skeleton.dof_limits.T
     return replace(
         skeleton,
+        dof_limits=np.stack([np.minimum(low, pose.dofs), np.maximum(high, pose.dofs)], axis=1),
         rest_translations=skeleton.rest_translations + pose.translations,
         rest_rotations=pose.rotations,
         rest_scales=pose.scales,

@@ -36,6 +36,7 @@ from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import aligned_rests, driven_clip
 from viewer.rigs.retargeting.retarget import retarget
+from viewer.rigs.skeleton import FIRST_ROTATION
 
 CONVENTIONS = {
     "a-pose": a_pose,
@@ -269,3 +270,22 @@ def test_figures_bound_in_another_pose_are_driven_from_their_t_or_a_pose(stands)
         assert same[0].min() == pytest.approx(np.cos(0.15), abs=1e-12)
     else:
         assert_allclose(same, 1.0, atol=1e-12)
+
+
+def test_angles_of_the_rest_pose_are_part_of_it():
+    # A skeleton may state its rest pose by quaternions, as in glTF, or by DOFs, as in .skel.
+    source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
+    skeleton, names = figure.skeleton, list(BODY)
+    dofs, vectors = np.zeros(skeleton.n_dofs), np.zeros((len(names), 3))
+    for name, axis, angle in (("neck", 0, 0.7), ("left_elbow", 1, -0.5), ("right_hip", 2, 0.2)):
+        joint = names.index(name)
+        vectors[joint, axis] = angle
+        rows = (skeleton.dof_joints == joint) & (skeleton.dof_kinds == FIRST_ROTATION + axis)
+        dofs[rows] = angle
+    drive = Drive(source, plants_feet=False, keeps_hands=False)
+    wanted, found = (
+        driven_clip(drive, replace(figure, skeleton=replace(skeleton, **rest)))[0]
+        for rest in ({"rest_rotations": quaternions(vectors)}, {"rest_dofs": dofs})
+    )
+    assert_allclose(np.abs((found.rotations * wanted.rotations).sum(axis=2)), 1.0, atol=1e-12)
+    assert_allclose(found.translations, wanted.translations, atol=1e-12)

@@ -29,14 +29,13 @@ from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.rigging import Comparison, Result, Rigging, is_intact, no_results
 from viewer.autorig.confidence import doubts
-from viewer.autorig.rigged import clip_for
+from viewer.autorig.rigged import clip_for, start_of_clips
 from viewer.exporters._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
 from viewer.formats import file_stem
 from viewer.phrases import capitalized, printable
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Ints
 from viewer.rigs.comparison.pairs import Pairs, row_distances
-from viewer.rigs.figure import figure_pose
 from viewer.rigs.hierarchy import depth_first
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.motion.sampled_animation import baked
@@ -269,7 +268,7 @@ def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     actor.clip = clip_for(rigged, clip)
     state.of(SavedWork).add(actor.keyed)
     # The clip sets the same DOFs as the template's; the target's rotation is not part of it.
-    actor.pose = figure_pose(rigged.figure)
+    actor.pose = start_of_clips(rigged)
     actor.offset = result.template.actor.offset if result.template.actor else 0.0
     # From the template's space to the target's, without scale.
     matrix, alignment = rigged.placement, rigged.alignment

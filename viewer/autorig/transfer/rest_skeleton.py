@@ -100,7 +100,7 @@ def fit_rest_skeleton(
     if skeleton.boxes is not None:
         fitted = replace(fitted, boxes=scale * skeleton.boxes)
     posed = scaled_pose(skeleton, pose, joint_scales)
-    fitted, lines = _rotate_roots(fitted, posed, similarity.rotation)
+    fitted, lines = rotate_roots(fitted, posed, similarity.rotation)
     _move_roots(fitted, posed, joints)
     bind = _bind_matrices(skeleton.parents, skin.inverse_bind, longer, scale)
     inverse_bind = np.asarray(np.linalg.inv(bind), dtype=np.float64)
@@ -194,7 +194,7 @@ def scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
     return posed
 
 
-def _rotate_roots(
+def rotate_roots(
     skeleton: Skeleton, pose: Pose, rotation: Floats
 ) -> tuple[Skeleton, list[Diagnostic]]:
     """Rotate the roots by the alignment, in place; ball joints are rotated by their DOFs."""

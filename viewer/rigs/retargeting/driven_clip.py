@@ -22,6 +22,7 @@ from viewer.rigs.retargeting.limb_hierarchy import limb_figure
 from viewer.rigs.retargeting.rest_alignment import rest_of
 from viewer.rigs.retargeting.retarget import retarget
 from viewer.rigs.retargeting.source_rest import (
+    with_rest_angles,
     with_source_rest,
     with_standing_rest,
     with_upright_rest,
@@ -34,6 +35,7 @@ _SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of th
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
+    figure = with_rest_angles(figure)
     limbs = limb_figure(figure)
     body = with_standing_rest(figure if limbs is None else limbs.figure)
     chosen = drive.joint_map if limbs is None else limbs.renamed(drive.joint_map, figure)
@@ -73,7 +75,7 @@ def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
     motion = with_source_rest(with_upright_rest(drive.motion), drive.source_rest)[0].figure
     axes = up_rotation(motion.up, figure.up)
     source = rest_of(motion.require_skeleton(), axes, figure.up).points
-    target = with_standing_rest(figure).require_skeleton()
+    target = with_standing_rest(with_rest_angles(figure)).require_skeleton()
     return source, rest_of(target, np.eye(3), figure.up).points
 
 

@@ -21,6 +21,8 @@ from viewer.rigs.geometry.quaternion import between
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import axis_vector
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.placed_figure import bound_in
+from viewer.rigs.pose import joint_rotations, rest_pose
 from viewer.rigs.retargeting.anatomical_rest import (
     SIDES,
     Postures,
@@ -30,7 +32,7 @@ from viewer.rigs.retargeting.anatomical_rest import (
     rest_posture,
     upright_frames,
 )
-from viewer.rigs.skeleton import Skeleton
+from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton
 
 SourceRest = int | str
 """A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
@@ -107,6 +109,28 @@ def with_source_rest(
         note = Diagnostic(key, values={**called, "remedy": _REMEDY})
         return _placed(motion, skeleton, found.rotations), [note]
     return _estimated(motion, skeleton, upright)
+
+
+def with_rest_angles(figure: Figure) -> Figure:
+    """Return a figure to drive whose rest rotations contain the angles of its rest pose.
+
+    Its DOFs are 0 then. The mesh is bound there, so that soles and skin are those at rest.
+    """
+    skeleton = figure.require_skeleton()
+    pose, rotates = rest_pose(skeleton), skeleton.dof_kinds >= FIRST_ROTATION
+    if not pose.dofs[rotates].any():
+        return figure
+    pose.dofs[~rotates] = 0.0  # motions set them to 0
+    if figure.is_attached and figure.blend_shapes is None:
+        figure = bound_in(figure, pose)
+        skeleton = figure.require_skeleton()
+    rested = replace(
+        skeleton,
+        rest_rotations=matrix_to_quaternion(joint_rotations(skeleton, pose)),
+        rest_dofs=np.zeros(skeleton.n_dofs),
+        dof_limits=np.where(rotates[:, None], [-np.inf, np.inf], skeleton.dof_limits),
+    )
+    return replace(figure, skeleton=rested)
 
 
 def with_standing_rest(figure: Figure) -> Figure:

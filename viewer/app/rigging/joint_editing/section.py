@@ -66,7 +66,7 @@ from viewer.rigs.geometry.quaternion import between
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.transform import apply_transform, translation_matrix
 from viewer.rigs.hierarchy import descendants
-from viewer.rigs.joint_edits import at_rest, moved, no_edit, prepared, rest_worlds
+from viewer.rigs.joint_edits import moved, no_edit, prepared, rest_worlds
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.pose import placement_matrix, rest_pose
 from viewer.rigs.retargeting.joint_names import LIMBS, joint_meanings
@@ -266,8 +266,7 @@ def _fitted_template(state: AppState, actor: Actor) -> _Start:
         )
         plain = replace(pose, shape_weights=np.zeros(0))
         rigged = transfer(joints, plain, mesh, TransferSettings("heat", settings, how), name)
-        rest = at_rest(rigged.figure.require_skeleton(), rigged.pose)
-        figure = replace(rigged.figure, skeleton=rest, hands=(), pose_layout=None, fields=())
+        figure = replace(rigged.figure, hands=(), pose_layout=None, fields=())
         fits = found.template.figure.is_attached
         matrix = place @ rigged.placement
         return _Begun(figure, matrix, template=found.template if fits else None)
