@@ -121,6 +121,24 @@ def test_character_that_never_rests_is_in_the_ground_if_it_is_in_nearly_all_fram
         assert found.diagnostic.values["depth"] == f"{1000 * expected:.0f} mm"
 
 
+@pytest.mark.parametrize(
+    ("lean", "depth", "key"), [(90.0, 1.3, "C013.no-height"), (30.0, 0.5, "C008.throughout")]
+)
+def test_swimmer_is_not_in_the_ground_as_a_runner_is(lean, depth, key):
+    # It bobs as above, and leans so that its legs are horizontal, or 13 % less high.
+    figure, times = viewer.load(bundled_body()).actors[0].figure, _K / RATE
+    heights = 0.1 * np.sin(2.0 * np.pi * 3.0 * times) - depth
+    half = np.radians(0.5 * lean)
+    channels = (
+        ("translation", figure.skeleton.rest_translations[0] + along(1, heights)),
+        ("rotation", np.tile([np.sin(half), 0.0, 0.0, np.cos(half)], (FRAMES, 1))),
+    )
+    keys = tuple(TransformChannel(0, path, times, values) for path, values in channels)
+    actor = Actor(figure, clip=TransformClip("keys", keys, 0.0, float(times[-1])))
+    (found,) = check_feet(Subject(actor))
+    assert found.diagnostic.key == key
+
+
 def test_notes_about_several_animations_are_one_line():
     """The figure plays two animations with a dip of one foot."""
     figure = legs()

@@ -19,6 +19,7 @@ from viewer.rigs.feet.contacts import (
     along_ground,
     foot_contacts,
     half_window,
+    is_upright,
     mean_speeds,
     moving_ground,
     on_moving_ground,
@@ -95,9 +96,12 @@ def check(subject: Subject) -> Iterator[Finding]:
         stance = Actor(track.stance, placement=subject.actor.placement)
         found = ground_under(stance, subject.up, heights, track.present, step)
         if found.height is None:
-            # Feet that are below the ground in nearly all frames are so wherever they rest.
+            # Feet that are below the ground in nearly all frames are so wherever they rest, unless
+            # they are those of a swimmer.
             highest = float(np.quantile(heights.min(axis=1)[track.present], _NEARLY_ALL))
-            sunk = [*_sunk_throughout(subject, track, highest, height)]
+            legs = np.concatenate([(path.hip - path.heel)[track.present] for path in track.paths])
+            runs = is_upright(legs, axis_vector(subject.up))
+            sunk = [*_sunk_throughout(subject, track, highest, height)] if runs else []
             yield from sunk or [_unsure(subject, found, step)]
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS

@@ -105,6 +105,11 @@ def foot_contacts(
     return result
 
 
+def is_upright(legs: Floats, up: Floats) -> bool:
+    """Return whether vectors from heel to hip (N, 3) mostly are those of a body on its feet."""
+    return float(np.median(legs @ up - limits.UPRIGHT * lengths_of(legs))) >= 0.0
+
+
 def _contact(
     foot: FootPath,
     start: int,
@@ -116,8 +121,7 @@ def _contact(
     """Return a contact without the loose rows at its ends; None if the person lies down."""
     toe, heel = stands
     slow = np.flatnonzero(hold >= 1.0) + start
-    legs = foot.hip[slow] - foot.heel[slow]
-    if np.median(legs @ up - limits.UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+    if not is_upright(foot.hip[slow] - foot.heel[slow], up):
         return None
     height = float(np.median(foot.lowest(up)[slow]))
     tilt = float(np.median((foot.heel[slow] - foot.toe[slow]) @ up))

@@ -29,6 +29,7 @@ from viewer.rigs.feet.contacts import (
     FootPath,
     foot_contacts,
     ground_level,
+    is_upright,
     moving_ground,
     on_moving_ground,
     step_height,
@@ -248,7 +249,7 @@ def _below_source(feet: Sequence[FootPath], body: BodyLegs, worlds: Floats, up: 
     # of a figure with low ankles float where those of the source only touch the ground for a frame,
     # as in a run of a game.
     legs = np.concatenate([foot.hip - foot.heel for foot in feet])
-    if np.median(legs @ up - limits.UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+    if not is_upright(legs, up):
         return 0.0
     lows = np.min([foot.lowest(up) for foot in feet], axis=0), body.heights(worlds, up).min(axis=1)
     theirs, own = (float(np.percentile(each, _LOWEST_ROWS)) for each in lows)
