@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.quaternion import multiply
@@ -37,10 +37,17 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
     figure = with_rest_angles(figure)
     limbs = limb_figure(figure)
-    body = with_standing_rest(figure if limbs is None else limbs.figure)
+    bound = figure if limbs is None else limbs.figure
+    body = with_standing_rest(bound)
     chosen = drive.joint_map if limbs is None else limbs.renamed(drive.joint_map, figure)
     found = retarget(drive.motion, body, chosen, drive.source_rest)
     clip, notes = found.clip, found.notes
+    if body is not bound:
+        key = (
+            "F007.rest-figure: rest pose of {figure}: a T- or A-pose, in which its joint axes are "
+            "parallel to the body's, because that of its file is not a standing pose"
+        )
+        notes = [*notes, note(key, figure=figure.name)]
     if drive.plants_feet:
         clip, changes = plant_feet(found, body)
         notes = notes + feet_notes(changes, found, body)
