@@ -250,6 +250,13 @@ def test_no_module_has_the_name_of_a_public_function():
     assert not functions & modules
 
 
+def test_benchmarks_are_described():
+    folder = TESTS / "bench"
+    text = (folder / "README.md").read_text()
+    missing = [path.name for path in folder.glob("bench_*.py") if f"| `{path.name}` |" not in text]
+    assert missing == []
+
+
 def test_shaders_state_their_version_and_use_name_prefixes():
     for path in (ROOT / "shaders").glob("*.*"):
         text = path.read_text()
