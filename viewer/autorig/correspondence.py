@@ -78,7 +78,7 @@ class MatchSettings:
     near_angle: float = math.radians(60.0)
     """Within this fraction of the diagonal, this angle suffices, or ``max_angle`` if it is larger:
     normals of sharp and thin parts of a coarse mesh are unreliable. Sheets thinner than this are
-    matched on the side whose normal agrees."""
+    matched on the side whose normal agrees. Weights of vertices farther away are diffused."""
     flipped_normals: bool = False
     """Also accept opposite normals. An island that is entirely inside out is reversed in any
     case."""

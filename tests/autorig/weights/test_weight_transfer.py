@@ -665,3 +665,25 @@ def test_large_patch_on_another_limb_keeps_its_matches():
     template = Template(positions, triangles)
     found = transferred_weights(template, skin, target, triangles, WeightSettings())
     assert found.matched.all()
+
+
+def test_weights_diffuse_over_twice_the_distance_from_the_template():
+    # Of a sheet 0.2 above one with a step of the weights, w - l^2 w'' = step with l = 0.4: the
+    # solution is exp(-|x| / l) / 2 on one side, and 1 minus that on the other.
+    x, y = np.linspace(-4.975, 4.975, 200), np.linspace(0.0, 1.0, 5)
+    positions = np.stack([*np.meshgrid(x, y), np.zeros((5, 200))], axis=2).reshape(-1, 3)
+    index = np.arange(1000).reshape(5, 200)
+    squares = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
+    a, b, c, d = (part.ravel() for part in squares)
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+    right = positions[:, 0] > 0.0
+    skin = skin_from_entries(1000, np.arange(1000), right.astype(int), np.ones(1000), BIND)
+    above, template = positions + np.array([0.0, 0.0, 0.2]), Template(positions, triangles)
+    found = transferred_weights(template, skin, above, triangles, WeightSettings())
+    assert found.matched.all()
+    tail = 0.5 * np.exp(-np.abs(positions[:, 0]) / 0.4)
+    np.testing.assert_allclose(dense(found)[:, 1], np.where(right, 1.0 - tail, tail), atol=0.005)
+    # Within half a percent of the size, they are copied.
+    near = positions + np.array([0.0, 0.0, 0.04])
+    found = transferred_weights(template, skin, near, triangles, WeightSettings())
+    np.testing.assert_allclose(dense(found)[:, 1], right, atol=1e-12)

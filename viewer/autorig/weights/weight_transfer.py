@@ -8,6 +8,10 @@ weights W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with the Laplacian L and 
 
 Constants have zero energy, so rows still sum to 1. The second term makes transitions smooth,
 but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
+
+Closest points on a template of another shape jump from limb to limb. A match at distance d says to
+about 2d where on the limb a vertex is, so its weights diffuse that far over the surface
+(``_settled``). Near the template, weights are copied exactly.
 """
 
 from __future__ import annotations
@@ -54,6 +58,11 @@ _TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
 _SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
 _STEPS = 2000  # maximum iterations of conjugate gradients
 _CONVERGED = 1e-9  # relative residual at which iterations end
+# Heat of a weight W at distance d from the template, relative to 1 / d^2: weights diffuse over
+# lengths of 2d. On 14 characters, edges that are stretched more than by the artist's weights are so
+# by 14 % less than without, and deformations are slightly better, as they are from 0.1 to 1.
+_TRUST = 0.25
+_LEAST = 1e-3  # weights below this are dropped: diffused ones decay, but never end
 _ROUNDS = 10  # number of smoothing iterations
 _FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
 _REPORTED = 0.05  # fraction of the size up to which nearest vertices are reported as matched
@@ -115,7 +124,19 @@ def transferred_weights(
     has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
     rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
     inpainted = ~found.matched & has_match[target.islands]
-    rows, method = _inpainted(target, size, rows, found.matched, inpainted)
+    distances = found.points.distances / size
+    distances = np.where(inpainted, np.maximum(distances, settings.match.max_distance), distances)
+    loose = (distances > settings.match.near_distance) & has_match[target.islands]
+    method = "direct"
+    if loose.any():
+        report_fraction(0.5, "measuring the surface")
+        # On the mesh scaled to size 1, as the operator is dimensionless.
+        operator, areas = laplacian(replace(target, positions=target.positions / size))
+        with part_of_work(span=(0.55, 0.8)):
+            values, method = inpaint(operator, areas, rows, found.matched, inpainted)
+        rows = put_rows(rows, np.nonzero(inpainted)[0], values)
+        with part_of_work(span=(0.8, 0.95)):
+            rows = _settled(operator, areas, rows, distances, loose)
     if settings.smoothing_rounds and inpainted.any():
         report_fraction(0.95, "smoothing")
         reach = settings.match.max_distance * size
@@ -214,18 +235,26 @@ def _with_rigid(
     return rows, RigidIslands(first, sizes, strongest, points.distances)
 
 
-def _inpainted(
-    target: Welded, size: float, rows: csr_array, matched: Bools, unknown: Bools
-) -> tuple[csr_array, str]:
-    """Solve for the unknown rows on the mesh scaled to size 1, as the operator is dimensionless."""
-    if not unknown.any():
-        return rows, "direct"
-    report_fraction(0.5, "measuring the surface")
-    operator, areas = laplacian(replace(target, positions=target.positions / size))
+def _settled(
+    operator: csr_array, areas: Floats, rows: csr_array, distances: Floats, loose: Bools
+) -> csr_array:
+    """Return the equilibrium of weights that heat their vertices, and diffuse over the surface.
 
-    with part_of_work(span=(0.55, 0.95)):
-        values, method = inpaint(operator, areas, rows, matched, unknown)
-    return put_rows(rows, np.nonzero(unknown)[0], values), method
+    With the Laplacian L, areas M and heat H = c / d^2, (L + M H) W' = M H W: as in ``bone_heat``,
+    from a template instead of bones. ``distances`` (W,) are relative to the size; weights of
+    vertices that are not ``loose`` stay.
+    """
+    from scipy import sparse
+
+    some, fixed = np.nonzero(loose)[0], np.nonzero(~loose)[0]
+    heat = sparse.diags_array(_TRUST * areas[some] / distances[some] ** 2)
+    matrix = sparse.csr_array(operator[some][:, some] + heat)
+    border = sparse.csr_array(sparse.hstack([operator[some][:, fixed], -heat]))
+    solve = factorised(matrix) or conjugate_gradients(matrix)
+    if not _is_true(solve, border):
+        return rows
+    given = sparse.csr_array(sparse.vstack([rows[fixed], rows[some]]))
+    return put_rows(rows, some, _solved(solve, border, given, "spreading weights", _LEAST))
 
 
 def inpaint(
@@ -254,15 +283,20 @@ def inpaint(
     ):
         solve = conjugate_gradients(matrix) if "conjugate" in method else factorised(matrix)
         if solve is not None and _is_true(solve, known):
-            return _solved(solve, known, weights[given]), method
+            return _solved(solve, known, weights[given], "inpainting weights"), method
     raise RigError(
         "the weights of unmatched vertices could not be computed: the mesh is too irregular; try "
         f"{Remedy('the method nearest', '--method nearest')}"
     )
 
 
-def _solved(solve: _Solve, border: csr_array, weights: csr_array) -> csr_array:
-    """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
+def _solved(
+    solve: _Solve, border: csr_array, weights: csr_array, step_name: str, least: float = _NEGLIGIBLE
+) -> csr_array:
+    """Return the clipped and rescaled solution for all joints that influence adjacent vertices.
+
+    Weights below ``least`` are dropped.
+    """
     from scipy import sparse
 
     used = np.unique(border.indices)  # matched vertices within two edges of an unknown vertex
@@ -271,9 +305,9 @@ def _solved(solve: _Solve, border: csr_array, weights: csr_array) -> csr_array:
     step = max(1, _BLOCK // right.shape[0])
     parts = []
     for start in range(0, len(joints), step):
-        report_fraction(start / len(joints), "inpainting weights")
+        report_fraction(start / len(joints), step_name)
         values = solve(right[:, joints[start : start + step]].toarray())
-        values[values < _NEGLIGIBLE] = 0.0
+        values[values < least] = 0.0
         parts.append(sparse.csc_array(values))
     found = sparse.csr_array(sparse.hstack(parts))
     sums = np.asarray(found.sum(axis=1)).ravel()
