@@ -1,8 +1,9 @@
 """Pipeline of a rig transfer: align, transfer weights and joints, invert the pose, and check.
 
 The robust method aligns template and target, validates closest points, moves the joints with the
-surface around them, and transforms the target to its rest pose. The seed method, provided for
-comparison, is in ``seed``.
+surface around them, and transforms the target to the bind pose of the template. The pose in which
+the target was found becomes the rest pose. The seed method, provided for comparison, is in
+``seed``.
 """
 
 from __future__ import annotations
