@@ -9,13 +9,15 @@ from rigs.retargeting.rest_twins import NAMES, PERSON, X, Y, along_x, t_pose, wr
 from rigs.retargeting.two_people import figure_of, places
 from rigs.retargeting.walking import N_WALK, RATE, stands, walk
 
+from viewer.loading import bundled_body, load
 from viewer.rigs.arrays import Floats
 from viewer.rigs.feet.contacts import FootPath, foot_contacts
-from viewer.rigs.figure import Figure
+from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.skeleton_motion import SkeletonMotion
+from viewer.rigs.placed_figure import bound_in
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.driven_feet import plant_feet
@@ -270,6 +272,27 @@ def test_planting_can_be_switched_off_and_is_reported():
     _, notes = driven_clip(Drive(motion), OTHER)
     text = str(next(note for note in notes if note.key == "F007.feet-planted"))
     assert "planted during 6 contacts" in text and "--feet off" in text
+
+
+def test_figure_bound_as_a_runner_stands_on_the_same_ground():
+    body = replace(load(bundled_body()).actors[0].figure, correctives=None, joint_regressor=None)
+    pose = figure_pose(body)
+    for name, vector in (
+        *(("left_hip", (-1.0, 0, 0)), ("left_knee", (0.9, 0, 0)), ("right_knee", (1.1, 0, 0))),
+        *(("left_shoulder", (0, 0.5, -1.0)), ("right_elbow", (0, 1.2, 0))),
+    ):
+        pose[name] = vector
+    runner = bound_in(body, pose)
+    rotations, path = walk()
+    drive = Drive(written(t_pose(), rotations, path - 60.0 * Y, rate=RATE))
+    wanted, found = (driven_clip(drive, each)[0] for each in (body, runner))
+    for name in ("pelvis", "left_foot", "right_ankle", "head"):
+        mine, theirs = (
+            places(each, clip)[name] + clip.figure_translations
+            for each, clip in ((runner, found), (body, wanted))
+        )
+        # Metres: skin between two joints is bound elsewhere, by a fraction of a millimetre.
+        assert_allclose(mine, theirs, rtol=0, atol=1e-3, err_msg=name)
 
 
 @pytest.mark.parametrize("speed", [0.0, 10.0])

@@ -18,10 +18,14 @@ from viewer.rigs.pose import zero_pose
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skin import Skin, owners, strongest_influences
+from viewer.rigs.skinning import deform
 
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
 # Tilts of a foot, from walking to lying on its instep.
 _TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
+# Difference of skinning matrices from the identity at which a figure is bound at rest, relative to
+# its size.
+_BOUND = 1e-4
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 _soles: Memo[Figure, Soles | None] = Memo(kept=2)
@@ -71,8 +75,22 @@ def extent(figure: Figure) -> tuple[float, float]:
     values = rest_joints(figure)[:, axis]
     if figure.mesh is not None:
         ends = (_STRAYS, 1.0 - _STRAYS)
-        values = np.quantile(figure.mesh.positions[:, axis], ends, method="nearest")
+        values = np.quantile(_resting(figure, figure.mesh)[:, axis], ends, method="nearest")
     return float(values.min()), float(np.ptp(values))
+
+
+def _resting(figure: Figure, mesh: Mesh) -> Floats:
+    """Return the vertices (V, 3) at rest, which may be bound in another pose."""
+    skeleton, skin = figure.skeleton, figure.skin
+    if skeleton is None or skin is None:
+        return mesh.positions
+    palette = world_matrices(skeleton, zero_pose(skeleton)) @ skin.inverse_bind
+    # Most figures are bound at rest: their vertices need no skinning.
+    moved = np.abs(palette - np.eye(4)).max(axis=0)[:3]
+    moved[:, 3] /= max(float(np.ptp(mesh.positions)), 1e-300)
+    if moved.max() < _BOUND:
+        return mesh.positions
+    return deform(figure, zero_pose(skeleton))[0]
 
 
 def _axis(figure: Figure) -> int:
