@@ -274,14 +274,16 @@ def test_figures_bound_in_another_pose_are_driven_from_their_t_or_a_pose(stands)
         assert_allclose(same, 1.0, atol=1e-12)
 
 
-def test_angles_of_the_rest_pose_are_part_of_it():
+@pytest.mark.parametrize("stands", [True, False])
+def test_angles_of_a_rest_pose_that_stands_are_part_of_it(stands):
     # A skeleton may state its rest pose by quaternions, as in glTF, or by DOFs, as in .skel.
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     skeleton, names = figure.skeleton, list(BODY)
     dofs, vectors = np.zeros(skeleton.n_dofs), np.zeros((len(names), 3))
-    for name, axis, angle in (("neck", 0, 0.7), ("left_elbow", 1, -0.5), ("right_hip", 2, 0.2)):
+    for name, axis, angle in (("neck", 0, 0.7), ("left_elbow", 1, -0.5), ("right_hip", 0, -0.2)):
         joint = names.index(name)
-        vectors[joint, axis] = angle
+        angle *= 1.0 if stands or name != "right_hip" else 6.0
+        vectors[joint, axis] = angle if stands else 0.0
         rows = (skeleton.dof_joints == joint) & (skeleton.dof_kinds == FIRST_ROTATION + axis)
         dofs[rows] = angle
     drive = Drive(source, plants_feet=False, keeps_hands=False)

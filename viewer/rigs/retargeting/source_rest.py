@@ -114,9 +114,11 @@ def with_source_rest(
 def with_rest_angles(figure: Figure) -> Figure:
     """Return a figure to drive whose rest rotations contain the angles of its rest pose.
 
-    Its DOFs are 0 then. The mesh is bound there, so that soles and skin are those at rest.
+    Its DOFs are 0 then. The mesh is bound there, so that soles and skin are those at rest. If a
+    person does not stand there, or it is none, the angles are just a pose: animals are often bound
+    with DOFs at 0 and look around at rest.
     """
-    skeleton = figure.require_skeleton()
+    given, skeleton = figure, figure.require_skeleton()
     pose, rotates = rest_pose(skeleton), skeleton.dof_kinds >= FIRST_ROTATION
     if not pose.dofs[rotates].any():
         return figure
@@ -130,6 +132,9 @@ def with_rest_angles(figure: Figure) -> Figure:
         rest_dofs=np.zeros(skeleton.n_dofs),
         dof_limits=np.where(rotates[:, None], [-np.inf, np.inf], skeleton.dof_limits),
     )
+    still = rest_posture(rested, figure.up)
+    if still is None or not _stands(still):
+        return given
     return replace(figure, skeleton=rested)
 
 
