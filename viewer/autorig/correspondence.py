@@ -212,15 +212,21 @@ def _are_apart(
     """
     from scipy.sparse import csgraph
 
+    if len(starts) == 0:
+        return np.zeros(0, dtype=np.bool_)
     welded, corners = template.welded, template.welded.vertices[template.triangles]
     at = corners[points.triangles, points.barycentric.argmax(axis=1)]
     # A path from corner to corner may be longer by the way from each point to its corner.
     sides = side_lengths(template.positions, template.triangles).max(axis=1)[points.triangles]
     reach = reach + sides[starts] + sides[ends]
-    judged = np.flatnonzero(welded.islands[at[starts]] == welded.islands[at[ends]])
+    graph = edge_graph(welded.positions, welded.triangles)
+    # Most neighbours have the same corner or two ends of an edge, which takes no search.
+    one, other = np.minimum(at[starts], at[ends]), np.maximum(at[starts], at[ends])
+    direct = np.asarray(graph[one, other]).reshape(-1)
+    is_near = (one == other) | ((direct > 0.0) & (direct <= reach))
+    judged = np.flatnonzero(~is_near & (welded.islands[one] == welded.islands[other]))
     # Long edges need long paths: they are computed apart from the many short ones.
     judged = judged[np.argsort(reach[judged], kind="stable")]
-    graph = edge_graph(welded.positions, welded.triangles)
     apart = np.zeros(len(starts), dtype=np.bool_)
     step = max(1, _LENGTHS // graph.shape[0])
     for start in range(0, len(judged), step):
