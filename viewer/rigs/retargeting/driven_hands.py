@@ -2,16 +2,18 @@
 
 Retargeting preserves the directions of limbs, so hands that rest on a hip, touch the head or clap
 miss if proportions differ. Near a part of the body, a wrist gets the place relative to that part
-that it has in the source, scaled by the height; elbow and shoulder follow. Hands that are at the
-trunk, at the head or at each other in the source are then moved out of the skin. Hands of long arms
-stay above the ground if those of the source do.
+that it has in the source, scaled by the height; elbow and shoulder follow. If the figure has a
+skin, what counts is the gap between the hand and the skin instead: hands come as near to it as
+those of the source do, whose skin is estimated from the joints, and touch it where those do. Hands
+of long arms stay above the ground if those of the source do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import pairwise
+from functools import partial
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -29,16 +31,19 @@ from viewer.rigs.feet.body import (
     spans_of,
 )
 from viewer.rigs.feet.curves import falling, smooth_curves, strength
-from viewer.rigs.feet.legs import Leg, leg_rotations
+from viewer.rigs.feet.legs import Leg, bend, hinges, leg_rotations, unscaled
 from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import axis_vector, unit
 from viewer.rigs.hierarchy import descendants
+from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.mesh import area_vectors
 from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
+from viewer.rigs.pose import rest_pose
 from viewer.rigs.retargeting.retarget import Retargeted
 from viewer.rigs.scalars import length_text
 from viewer.rigs.shape import rest_joints, shaped
@@ -76,24 +81,56 @@ _CROWN = 0.15
 
 _GIRTH = 75.0  # percentile of the distances of the skin from a thigh that is taken as its radius
 
-# Distances of a wrist of the motion from the axis of the trunk or the head: up to the first, the
-# hand is on it and may be moved out of the skin, beyond the second it may not. The wrist is up to
-# 0.17 away with the hand on a hip or on the belly, 0.19 to 0.23 where the arm swings beside the
-# body: there, a way out would only shake it.
-_ON, _OFF = 0.16, 0.19
+# Gaps between a wrist of the motion and the skin of a part, relative to the height: up to the
+# first, it is at the part, beyond the second it is not. A person's wrist is 0.03 to 0.07 away with
+# the hand on a hip or on the head.
+_WRIST_AT, _WRIST_OFF = 0.06, 0.13
+# Gaps between a hand and the skin likewise: up to the first, it touches the skin, beyond the second
+# it does not: 0.1 where the arm hangs beside a thigh.
+_TOUCHING, _OFF = 0.02, 0.07
+# Error of these gaps, because a person's skin is only estimated.
+_UNSURE = 0.02
+# Lengths of the smooth curve of a hand's shift to the skin, seconds, as _EASE: where it does not
+# touch, and where it does. A power of the contact lies between them, so that hands that only come
+# near do not bend the curve.
+_FADE, _STEADY, _POWER = 0.3, 0.08, 8
+_LITTLE = 0.01  # weight of the place that is known without the skin
+_NONE = 1e-4  # shifts that are no change
+
+# The skin of people whose motion has none consists of tapered capsules, with lengths relative to
+# the height from ankles to neck. They are fitted to the surface of the bundled body, from which
+# they are up to 0.015 away. Those of the trunk: the ends as fractions of the way from pelvis to
+# neck, how far these are before it, and the radii there.
+_TRUNK = (
+    ((0.0, 0.02, 0.09), (0.31, 0.05, 0.06)),
+    ((0.31, 0.05, 0.06), (0.63, 0.03, 0.105)),
+    ((0.63, 0.03, 0.105), (1.0, -0.005, 0.042)),
+)  # fmt: skip
+# From part of the way to a hip to part of the way to a shoulder: before it, and radius.
+_FLANK = ((0.32, 0.027, 0.08), (0.73, -0.005, 0.048))
+_NECK = 0.042
+# Above the head's joint, before it, radius; of chin and crown.
+_HEAD = ((0.013, 0.035, 0.058), (0.069, 0.012, 0.071))
+_THIGH, _ARM, _HAND = (0.082, 0.045), (0.047, 0.027, 0.018), 0.013
+_HAND_LENGTH = 0.125
+# Points beside the axis of a hand, along and across it: of the thumb, of first and last fingers.
+_ASIDE = ((0.035, 0.025), (0.065, 0.052), (0.1, 0.02), (0.1, -0.02), (0.05, -0.025))
+
 # Points of the skin, between which a person has about 3 cm, and those of a hand that are kept
 # outside the others.
 _POINTS, _HAND_POINTS = 2000, 24
-_DEEP = 0.3  # depth up to which hands are moved out: more than half the width of a stout body
+_DISC = 0.012  # radius of the piece of the skin around a point
+_DEEP = 0.2  # distance up to which skin is near a hand: half the width of a stout body
+_FEWER = 4  # of so many points, one counts for whether another is inside
+_BLUNT = 0.04  # radius of the end of a hand that comes along a ray
 # Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
 # edge of something thin, or of an open mesh, the nearest point is aside.
 _BEHIND = 0.5
 # Winding number between that of points of a closed skin, 1/2, and of an open sheet, 0.
 _SOLID = 0.25
-# Hands are moved out in rounds, each smoothed over that many seconds before and after a frame, so
-# that they begin to give way before they would enter the body: a tenth of a second is the time in
-# which a person's hand stops.
-_ROUNDS, _WIDTH = 8, 0.1
+# Hands are moved in rounds, at most so far in each. Gaps that are wider than those of the source
+# by less than the first are closed, by more than the second are between other parts.
+_ROUNDS, _FAST, _PULL = 12, 0.12, (0.06, 0.12)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +146,8 @@ class KeptHands:
     lifted: float = 0.0
     """Largest distance, in figure units, by which a hand was lifted to stay above the ground."""
     moved_out: float = 0.0
-    """Largest distance, in figure units, by which a hand was moved out of the skin."""
+    """Largest distance, in figure units, by which a hand was moved away from the trunk to be as far
+    from the skin as in the source."""
 
 
 class _Body:
@@ -142,6 +180,15 @@ class _Body:
             self._crown = np.linalg.pinv(self._head[:3, :3]) @ (length * self.trunk)
             self.place["crown"] = self.place["head"]
 
+    def axes(self, name: str) -> tuple[Floats, Floats]:
+        """Return the ways, (N, 3), that are up and forwards at rest, as a joint turns them."""
+        left = self.rest[self.place["left_hip"], :3, 3] - self.rest[self.place["right_hip"], :3, 3]
+        rest = np.stack([self.trunk, unit(np.cross(left, self.trunk))], axis=1)
+        place = self.place[name]
+        own = np.linalg.inv(self.rest[place, :3, :3]) @ rest
+        up, forward = np.moveaxis(self.world[:, place, :3, :3] @ own, 2, 0)
+        return unit(up), unit(forward)
+
     def at(self, name: str) -> Floats:
         """Return the positions of a joint, or the crown, relative to the height: (N, 3)."""
         world = self.world[:, self.place[name]]
@@ -167,7 +214,8 @@ def keep_hands(
     body = _Body(skeleton, clip, mine, rests, movers, crown)
     theirs = {name: int(found.matches.partners[joint]) for name, joint in mine.items()}
     own_rests = np.stack([source.rest_translations, source.rest_scales])
-    other = _Body(source, in_frame_order(found.source.clip), theirs, own_rests)
+    tips = _fingertips(source, theirs)
+    other = _Body(source, in_frame_order(found.source.clip), theirs, own_rests, tips)
     is_free = (body.chains.place[[each.joint for each in skeleton.constraints]] < 0).all()
     can_move = (
         is_free and is_solvable(body.rest[:, :3, :3]) and min(body.height, other.height) > 0.0
@@ -182,19 +230,26 @@ def keep_hands(
     differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
-    shifts = _eased(shifts, nearness, clip.timing)
-    shifts = [
-        _within_reach(body, arm, _beyond_slack(shift, slack))
-        for arm, shift in zip(_ARMS, shifts, strict=True)
-    ]
+    placed = np.stack(
+        [
+            _within_reach(body, arm, _beyond_slack(shift, slack))
+            for arm, shift in zip(_ARMS, _eased(shifts, nearness, clip.timing), strict=True)
+        ]
+    )
+    given_way = np.zeros_like(placed)
+    moved_out = 0.0
+    person = _Person(other, tips)
+    if points is not None and differs and points.parts.min() < 0 and person.holds.any():
+        solid = _Solid(points, body)
+        aims = _at_skin(body, other, person, found.to_target, solid, np.stack(shifts))
+        sides = np.stack([_side(other, number) @ found.to_target.T for number in range(len(_ARMS))])
+        given_way = _to_skin(body, solid, person, aims, sides, clip.timing) - placed
+        outwards = float(np.einsum("hna,hna->hn", given_way, sides).max())
+        moved_out = body.height * max(outwards, 0.0)
+    shifts = list(placed + given_way)
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
-    given_way = np.zeros((len(_ARMS), *shifts[0].shape))
-    if points is not None and differs:
-        rests_on = _rests_on(body, other, together)
-        given_way = _ways_out(points, body, shifts, rests_on, clip.timing)
-        shifts = [shift + each for shift, each in zip(shifts, given_way, strict=True)]
     lifts = _lifts(body, other, found, skin, up, shifts)
-    if not (any(shift.any() for shift in shifts) or lifts.any()):
+    if not touches and max(float(np.abs(shifts).max()), float(lifts.max())) < _NONE:
         return given, None
     shifts = [shift + lift[:, None] * up for shift, lift in zip(shifts, lifts, strict=True)]
     joints = body.chains.joints
@@ -205,13 +260,12 @@ def keep_hands(
         np.zeros((len(rotations), 3)), [body.height * shift for shift in shifts],
     )  # fmt: skip
     kept = replace(clip, rotations=rotations)
-    farthest = (np.linalg.norm(given_way, axis=2).max(), lifts.max())
-    moved_out, lifted = (body.height * float(each) for each in farthest)
+    lifted = body.height * float(lifts.max())
     if not touches:
         return kept, KeptHands(0.0, 0.0, lifted=lifted, moved_out=moved_out)
     reached = _Body(skeleton, kept, mine, rests, crown=crown)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    # Where a hand was moved out of the skin, it should be outside.
+    # Where a hand was moved to a gap from the skin, it should be there.
     missed = [shift + each for shift, each in zip(wished, given_way, strict=True)]
     return kept, KeptHands(before, _error(missed, nearness), least, lifted, moved_out)
 
@@ -248,8 +302,8 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
     if kept.moved_out:
         notes.append(
             note(
-                "F007.hands-outside: hands of {figure} moved out of its body by up to {length}; "
-                "{remedy} disables this",
+                "F007.hands-outside: hands of {figure} moved out by up to {length}, as far from "
+                "its skin as those of {motion} are from theirs; {remedy} disables this",
                 **called,
                 length=length_text(figure, kept.moved_out),
                 remedy=remedy,
@@ -275,6 +329,130 @@ def _driven_joints(found: Retargeted) -> dict[str, int]:
     names, is_driven = found.matches.names, found.matches.partners >= 0
     mine = {name: j for j, name in enumerate(names) if name in wanted and is_driven[j]}
     return {} if not needed <= mine.keys() or mine.keys().isdisjoint(_TOPS) else mine
+
+
+def _fingertips(skeleton: Skeleton, joints: dict[str, int]) -> list[int]:
+    """Return the joint of each hand that is farthest from its wrist, as of ``_ARMS``."""
+    points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
+    result = []
+    for arm in _ARMS:
+        rows = np.flatnonzero(descendants(skeleton.parents, joints[arm[2]]))
+        result.append(
+            int(rows[np.linalg.norm(points[rows] - points[joints[arm[2]]], axis=1).argmax()])
+        )
+    return result
+
+
+_Capsule = tuple[Floats, Floats, float, float]
+
+
+class _Person:
+    """Gaps between the hands of a motion and the person's skin, estimated from the joints."""
+
+    def __init__(self, body: _Body, tips: list[int]) -> None:
+        self.regions = _capsules(body)
+        self.wrist: list[dict[str, Floats]] = []
+        hands, arms = [], []
+        for arm, tip in zip(_ARMS, tips, strict=True):
+            shoulder, elbow, wrist = (body.at(name) for name in arm)
+            place = int(body.chains.place[tip])
+            rest = body.rest[[place, body.place[arm[2]]], :3, 3]
+            longest = float(np.linalg.norm(rest[0] - rest[1])) / body.height
+            along = body.world[:, place, :3, 3] / body.height - wrist
+            # A fist is shorter than a stretched hand. Of some hands, only the knuckles are known.
+            length = np.linalg.norm(along, axis=1, keepdims=True) / max(longest, 1e-30)
+            is_known = longest > 0.1 * _HAND_LENGTH
+            along, length = (along, length) if is_known else (wrist - elbow, np.float64(1.0))
+            end = wrist + _HAND_LENGTH * np.clip(length, 0.5, 1.0) * unit(along)
+            arms.append(
+                [
+                    (shoulder, elbow, *_ARM[:2]),
+                    (elbow, wrist, *_ARM[1:]),
+                    (wrist, end, _HAND, _HAND),
+                ]
+            )
+        for number in range(len(_ARMS)):
+            wrist, end = arms[number][2][:2]
+            self.wrist.append({name: _gap(wrist, each) for name, each in self.regions.items()})
+            every = [*chain.from_iterable(self.regions.values()), *arms[1 - number]]
+            points = [wrist + part * (end - wrist) for part in (0.0, 0.25, 0.5, 0.75, 1.0)]
+            # Thumbs point forwards at rest, be the arms stretched out or hanging.
+            along, forward = unit(end - wrist), body.axes(_ARMS[number][2])[1]
+            aside = unit(forward - np.einsum("na,na->n", forward, along)[:, None] * along)
+            points += [wrist + x * along + y * aside for x, y in _ASIDE]
+            hands.append(np.min([_gap(point, every) for point in points], axis=0) - _HAND)
+        self.hand = np.stack(hands)
+        self.touches: Floats = falling((self.hand - _TOUCHING) / (_OFF - _TOUCHING))
+        """(2, N). How much hands touch the body, 0 to 1."""
+        gaps = np.stack([np.min(list(each.values()), axis=0) for each in self.wrist])
+        self.holds: Floats = np.maximum(self.touches, _nearness(gaps))
+        """(2, N). How near they are to it, 0 to 1."""
+
+
+def _capsules(body: _Body) -> dict[str, list[_Capsule]]:
+    """Return the capsules of a person's trunk with the head, and of each thigh."""
+    top = next(name for name in _TOPS if name in body.place)
+    spine = [name for name in _PARTS[0][: _PARTS[0].index(top) + 1] if name in body.place]
+    rest = [body.rest[body.place[name], :3, 3] for name in spine]
+    lengths = np.linalg.norm(np.diff(rest, axis=0), axis=1)
+    reached = np.append(0.0, np.cumsum(lengths)) / max(float(lengths.sum()), 1e-30)
+    joints = [body.at(name) for name in spine]
+    up = unit(joints[-1] - joints[0])
+    across = [body.at(f"left_{name}") - body.at(f"right_{name}") for name in ("hip", "shoulder")]
+
+    def before(fraction: float) -> Floats:
+        return unit(np.cross((1.0 - fraction) * unit(across[0]) + fraction * unit(across[1]), up))
+
+    def middle(fraction: float) -> Floats:
+        place = int(np.clip(np.searchsorted(reached, fraction) - 1, 0, len(lengths) - 1))
+        part = (fraction - reached[place]) / max(float(reached[place + 1] - reached[place]), 1e-30)
+        return joints[place] + part * (joints[place + 1] - joints[place])
+
+    def end(fraction: float, ahead: float) -> Floats:
+        return middle(fraction) + ahead * before(fraction)
+
+    trunk: list[_Capsule] = [
+        (end(*first[:2]), end(*second[:2]), first[2], second[2]) for first, second in _TRUNK
+    ]
+    legs = {}
+    for side in ("left", "right"):
+        hip, knee, shoulder = (body.at(f"{side}_{name}") for name in ("hip", "knee", "shoulder"))
+        (low, ahead, wide), (high, behind, narrow) = _FLANK
+        trunk.append((
+            end(0.0, ahead) + low * (hip - joints[0]),
+            end(1.0, behind) + high * (shoulder - joints[-1]), wide, narrow,
+        ))  # fmt: skip
+        trunk.append((joints[-1], shoulder, _NECK, _ARM[0]))
+        legs[f"{side}_hip"] = [(hip, knee, *_THIGH)]
+    crowned = {}
+    if "head" in body.place:
+        head = body.at("head")
+        if top != "head":
+            trunk.append((joints[-1], head, _NECK, _NECK))
+        upward, forward = body.axes("head")
+        ends = [head + above * upward + ahead * forward for above, ahead, _ in _HEAD]
+        crowned["head"] = [(ends[0], ends[1], _HEAD[0][2], _HEAD[1][2])]
+    return {"pelvis": trunk, **crowned, **legs}
+
+
+def _nearness(gaps: Floats) -> Floats:
+    """Return how near wrists are to a skin, 0 to 1, by their gaps from it."""
+    return falling((gaps - _WRIST_AT) / (_WRIST_OFF - _WRIST_AT))
+
+
+def _gap(points: Floats, capsules: list[_Capsule]) -> Floats:
+    """Return the distances of points from the nearest capsule: (N,)."""
+    gaps = []
+    for start, end, first, last in capsules:
+        bone, away = end - start, points - start
+        part = np.einsum("na,na->n", away, bone) / np.maximum(
+            np.einsum("na,na->n", bone, bone), 1e-30
+        )
+        part = np.clip(part, 0.0, 1.0)
+        gaps.append(
+            np.linalg.norm(away - part[:, None] * bone, axis=1) - first - part * (last - first)
+        )
+    return np.min(gaps, axis=0)
 
 
 def _shifts(
@@ -305,10 +483,21 @@ def _shifts(
     # Hands that touch each other move by half of the difference each.
     ends = [body.at(arm[2]) + shift for arm, shift in zip(_ARMS, shifts, strict=True)]
     between = (other.at(_ARMS[1][2]) - other.at(_ARMS[0][2])) @ to_target.T
-    weight = falling((np.linalg.norm(between, axis=1) - _TOGETHER) / (_APART - _TOGETHER))
+    weight = _together(other)
     half = 0.5 * weight[:, None] * (between - (ends[1] - ends[0]))
     shifts = [shifts[0] - half, shifts[1] + half]
     return shifts, [np.maximum(near, weight) for near in nearness], weight
+
+
+def _region(start: str, end: str) -> str:
+    """Return the part of the body around a bone: trunk, head or a thigh, by its first joint."""
+    return "head" if end == "crown" else "pelvis" if start in _PARTS[0] else start
+
+
+def _together(other: _Body) -> Floats:
+    """Return how near the wrists are to each other, (N,): 1 where they touch, 0 where far."""
+    between = other.at(_ARMS[1][2]) - other.at(_ARMS[0][2])
+    return falling((np.linalg.norm(between, axis=1) - _TOGETHER) / (_APART - _TOGETHER))
 
 
 def _from_bone(body: _Body, wrist: str, start: str, end: str) -> tuple[Floats, Floats]:
@@ -318,17 +507,6 @@ def _from_bone(body: _Body, wrist: str, start: str, end: str) -> tuple[Floats, F
     along = np.einsum("na,na->n", away, bone)
     part = np.clip(along / np.maximum(np.einsum("na,na->n", bone, bone), 1e-30), 0, 1)
     return away - part[:, None] * bone, part
-
-
-def _rests_on(body: _Body, other: _Body, together: Floats) -> Floats:
-    """Return how much hands of the source are on trunk, head or each other, 0 to 1: (2, N)."""
-    bones = [each for each in _bones(body.place) if each not in _PARTS[1:]]
-    result = []
-    for arm in _ARMS:
-        ways = [_from_bone(other, arm[2], *bone)[0] for bone in bones]
-        distance = np.linalg.norm(ways, axis=2).min(axis=0)
-        result.append(np.maximum(falling((distance - _ON) / (_OFF - _ON)), together))
-    return np.stack(result)
 
 
 def _bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
@@ -453,8 +631,14 @@ class _SkinPoints:
     """(P, 3). Positions, and outward normals, in the space of the joints."""
     arms: Ints
     """(P,). 0 and 1 for points of the arms, as of ``_ARMS``, else -1."""
+    parts: Ints
+    """(P,). 0 for points of upper arms, 1 of forearms, 2 of hands, -1 for all others."""
     hands: Ints
-    """(P,). The same for hands."""
+    """(P,). As ``arms``, for the points that are kept outside the skin."""
+    regions: dict[str, Bools]
+    """(P,) each. Whether points are around the bones of a part, by the first name in ``_PARTS``."""
+    area: float
+    """Area of the piece of the skin at each point."""
     crown: float | None
     """Height of the crown above the head's joint; None if the head has no skin."""
 
@@ -484,10 +668,12 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
     movers, points, normals = movers[is_bound], points[is_bound], normals[is_bound]
     parents = figure.require_skeleton().parents
     rest = rest_joints(figure)
-    arms, hands = np.full((2, len(movers)), -1)
+    arms, hands, parts = np.full((3, len(movers)), -1)
     for number, arm in enumerate(_ARMS):
         shoulder, elbow, wrist = (joints[name] for name in arm)
-        arms[descendants(parents, shoulder)[movers]] = number
+        for part, joint in enumerate((shoulder, elbow, wrist)):
+            is_moved = descendants(parents, joint)[movers]
+            arms[is_moved], parts[is_moved] = number, part
         # A hand is at most as long as its forearm; beyond it are things that it holds.
         reach = np.linalg.norm(rest[wrist] - rest[elbow])
         is_hand = descendants(parents, wrist)[movers]
@@ -495,7 +681,7 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
     if not {0, 1} <= set(hands.tolist()):
         return None
     kept = np.flatnonzero((hands >= 0) | _is_solid(points, normals, area / _POINTS))
-    movers, arms, hands = movers[kept], arms[kept], hands[kept]
+    movers, arms, hands, parts = movers[kept], arms[kept], hands[kept], parts[kept]
     points, normals = points[kept], normals[kept]
     crown = None
     if "head" in joints:
@@ -504,10 +690,24 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
         trunk = unit(rest[top] - rest[joints["pelvis"]])
         if own.any():
             crown = float(np.quantile((points[own] - rest[joints["head"]]) @ trunk, 0.98))
+    regions = {"pelvis": arms < 0}
+    if "head" in joints:
+        regions["head"] = descendants(parents, joints["head"])[movers]
+        regions["pelvis"] &= ~regions["head"]
+    for hip, knee in _PARTS[1:]:
+        is_leg = descendants(parents, joints[hip])[movers]
+        regions[hip] = is_leg
+        # The trunk ends at the hips.
+        thigh = np.linalg.norm(rest[joints[knee]] - rest[joints[hip]])
+        regions["pelvis"] &= ~is_leg | (
+            np.linalg.norm(points - rest[joints[hip]], axis=1) < 0.4 * thigh
+        )
     bind = skin.inverse_bind[movers]
     places = np.einsum("pab,pb->pa", bind[:, :3, :3], points) + bind[:, :3, 3]
     normals = unit(np.einsum("pab,pb->pa", bind[:, :3, :3], normals))
-    return _SkinPoints(movers.astype(np.int32), places, normals, arms, hands, crown)
+    return _SkinPoints(
+        movers.astype(np.int32), places, normals, arms, parts, hands, regions, area / _POINTS, crown
+    )  # fmt: skip
 
 
 def _is_solid(points: Floats, normals: Floats, area: float) -> Bools:
@@ -530,95 +730,263 @@ def _is_solid(points: Floats, normals: Floats, area: float) -> Bools:
     return is_solid
 
 
-def _ways_out(
-    skin: _SkinPoints, body: _Body, shifts: list[Floats], rests_on: Floats, timing: Timing
+class _Solid:
+    """The skin of a body in the rows of its motion, with lengths relative to its height."""
+
+    def __init__(self, points: _SkinPoints, body: _Body) -> None:
+        self.points, self.body = points, body
+        self.area = points.area / body.height**2
+        self.place = body.chains.place[points.joints]
+        every = [np.flatnonzero(points.hands == number) for number in range(len(_ARMS))]
+        self.hands = [
+            rows[_spread(points.places[rows], _HAND_POINTS)].astype(np.int32) for rows in every
+        ]
+        self.regions = {
+            name: np.flatnonzero(each)[::2].astype(np.int32)
+            for name, each in points.regions.items()
+        }
+
+    def posed(self, row: int, rows: Ints) -> tuple[Floats, Floats]:
+        """Return the positions and normals of some points in a row."""
+        world = self.body.world[row, self.place[rows], :3]
+        points = np.einsum("pab,pb->pa", world[..., :3], self.points.places[rows]) + world[..., 3]
+        normals = np.einsum("pab,pb->pa", world[..., :3], self.points.normals[rows])
+        return points / self.body.height, unit(normals)
+
+    def around(
+        self, row: int, number: int, shift: Floats, arms: _Arms
+    ) -> tuple[Floats, Ints, Floats, Floats]:
+        """Return a hand's points, and the parts, positions and normals of the skin near it.
+
+        Only those of the other arm move with ``arms``.
+        """
+        own = self.posed(row, self.hands[number])[0]
+        others = np.flatnonzero(self.points.arms != number).astype(np.int32)
+        points, normals = self.posed(row, others)
+        parts = self.points.parts[others]
+        moved, _ = arms.moved(1 - number, row, parts, points, normals)
+        centre = own.mean(axis=0) + shift
+        reach = np.linalg.norm(own + shift - centre, axis=1).max() + _DEEP
+        is_near = ((moved - centre) ** 2).sum(axis=1) < reach**2
+        return own, parts[is_near], points[is_near], normals[is_near]
+
+    def encloses(self, row: int, number: int, points: Floats) -> Bools:
+        """Return whether points (H, 3) are inside the skin without an arm in a row: (H,)."""
+        others = np.flatnonzero(self.points.arms != number)[::_FEWER].astype(np.int32)
+        places, normals = self.posed(row, others)
+        area = _FEWER * self.area
+        ways = places - points[:, None]
+        squares = (ways**2).sum(axis=2) + area
+        angles = np.einsum("hpa,pa->hp", ways, normals) / (squares * np.sqrt(squares))
+        is_inside: Bools = area / (4.0 * np.pi) * angles.sum(axis=1) > _SOLID
+        return is_inside
+
+    def radii(self, region: str, starts: Floats, ways: Floats, needed: Bools) -> Floats:
+        """Return how far a blunt hand that comes along rays stops from their starts: (N,)."""
+        result = np.full(len(starts), np.nan)
+        rows = self.regions[region]
+        for row in np.flatnonzero(needed).tolist() if len(rows) else ():
+            away = self.posed(row, rows)[0] - starts[row]
+            along = away @ ways[row]
+            aside = (away**2).sum(axis=1) - along**2
+            is_ahead = (along > 0.0) & (aside < (2.0 * _BLUNT) ** 2)
+            if is_ahead.any():
+                result[row] = (along - aside / (2.0 * _BLUNT))[is_ahead].max()
+        return result
+
+
+def _at_skin(
+    body: _Body, other: _Body, person: _Person, to_target: Floats, solid: _Solid, shifts: Floats
 ) -> Floats:
-    """Return how far shifted wrists should move to keep hands outside the skin: (2, N, 3).
+    """Return shifts (2, N, 3) of wrists that put them as far from the skin as in the source.
 
-    ``rests_on``: (2, N), the part of the way that is gone. All lengths are relative to the height.
-    Hands translate, as their world rotations stay.
+    ``shifts``: (2, N, 3), those that are known without the skin.
     """
-    result = np.zeros((len(_ARMS), *shifts[0].shape))
-    every = [np.flatnonzero(skin.hands == number).astype(np.int32) for number in range(len(_ARMS))]
-    chosen = [rows[_spread(skin.places[rows], _HAND_POINTS)] for rows in every]
-    # 1 for points that move with the other hand. The rest of its arm moves in another way.
-    with_other = [(skin.hands == 1 - number).astype(np.float64) for number in range(len(_ARMS))]
-    place = body.chains.place[skin.joints]
+    result = np.empty_like(shifts)
+    for number, arm in enumerate(_ARMS):
+        own, is_held = body.at(arm[2]), person.holds[number] > 0.0
+        total, weights = _LITTLE * shifts[number], np.full(len(own), _LITTLE)
+        for name, gap in person.wrist[number].items():
+            bones = [bone for bone in _bones(body.place) if _region(*bone) == name]
+            found = [_from_bone(other, arm[2], *bone) for bone in bones]
+            distances = np.linalg.norm([away for away, _ in found], axis=2)
+            for (start, end), (away, along), distance in zip(bones, found, distances, strict=True):
+                weight = _nearness(gap + distance - distances.min(axis=0))
+                weight = np.where(is_held, weight, 0.0)
+                nearest = body.at(start) + along[:, None] * (body.at(end) - body.at(start))
+                way = unit(away @ to_target.T)
+                radius = solid.radii(name, nearest, way, weight > 0.0)
+                weight[np.isnan(radius)] = 0.0
+                ends = nearest + (np.nan_to_num(radius) + gap)[:, None] * way
+                total += weight[:, None] ** 2 * (ends - own)
+                weights += weight**2
+        result[number] = total / weights[:, None]
+    # Hands that touch each other move by half of the difference each.
+    first, second = (body.at(arm[2]) + shift for arm, shift in zip(_ARMS, result, strict=True))
+    between = (other.at(_ARMS[1][2]) - other.at(_ARMS[0][2])) @ to_target.T
+    half = 0.5 * _together(other)[:, None] * (between - (second - first))
+    return result + np.stack([-half, half])
 
-    def posed(row: int, rows: Ints) -> tuple[Floats, Floats]:
-        """Return the positions and normals of some points in a frame."""
-        world = body.world[row, place[rows], :3]
-        points = np.einsum("pab,pb->pa", world[..., :3], skin.places[rows]) + world[..., 3]
-        return points / body.height, unit(
-            np.einsum("pab,pb->pa", world[..., :3], skin.normals[rows])
-        )
 
-    def step(row: int, number: int, near: Ints) -> Floats:
-        """Return how far a hand, moved as far as it is now, should go on."""
-        hands = [shifts[each][row] + result[each, row] for each in range(len(_ARMS))]
-        others, normals = posed(row, near)
-        belongs = with_other[number][near, None]
-        own = posed(row, chosen[number])[0] + hands[number]
-        # Of two hands, each gives way by half.
-        return _way_out(own, others + belongs * hands[1 - number], normals, 1.0 - 0.5 * belongs)
+def _to_skin(
+    body: _Body, solid: _Solid, person: _Person, aims: Floats, sides: Floats, timing: Timing
+) -> Floats:
+    """Return smooth shifts (2, N, 3) of wrists with which hands keep the gaps of the source.
 
-    everything = np.arange(len(place), dtype=np.int32)
-    cases = []
-    for row in np.flatnonzero(rests_on.any(axis=0)).tolist():
-        points, _ = posed(row, everything)
-        for number in np.flatnonzero(rests_on[:, row]).tolist():
-            hand = chosen[number]
-            others = points + with_other[number][:, None] * shifts[1 - number][row]
-            own = points[hand] + shifts[number][row]
-            centre = own.mean(axis=0)
-            reach = np.linalg.norm(own - centre, axis=1).max() + _DEEP
-            is_near = ((others - centre) ** 2).sum(axis=1) < reach**2
-            is_near &= (skin.arms < 0) | (with_other[number] > 0.0)
-            near = np.flatnonzero(is_near).astype(np.int32)
-            if len(near) and step(row, number, near).any():
-                cases.append((row, number, near))
-    for _ in range(_ROUNDS):
-        steps = np.zeros_like(result)
-        for row, number, near in cases:
-            steps[number, row] = step(row, number, near)
-        if not steps.any():
+    ``aims``: (2, N, 3), first guesses; ``sides``: (2, N, 3), ways from the trunk to the hands.
+    """
+    targets, touches = aims.copy(), person.touches
+    result = _faded(body, targets, person.holds, timing)
+    # Hands that are in the body of the source may be as deep in the figure's.
+    gaps = person.hand - np.clip(person.hand, -_UNSURE, _UNSURE)
+    rows = np.flatnonzero(touches.any(axis=0)).astype(np.int32)
+    arms = _Arms(body, rows)
+    cases = [(int(row), int(n)) for row in rows for n in np.flatnonzero(touches[:, row])]
+    arms.bend(result[:, rows])
+    near = {case: solid.around(*case, result[case[1], case[0]], arms) for case in cases}
+    for _ in range(_ROUNDS if cases else 0):
+        arms.bend(result[:, rows])
+        farthest = 0.0
+        for case in cases:
+            row, number = case
+            own, parts, points, normals = near[case]
+            if not len(parts):
+                continue
+            points, normals = arms.moved(1 - number, row, parts, points, normals)
+            # Of two hands, each gives way by half.
+            give = np.where(parts == 2, 0.5, 1.0)
+            ways = np.where((parts < 0)[:, None], sides[number, row], 0.0)
+            own = own + result[number, row]
+            step = _step(
+                own, points, normals, partial(solid.encloses, *case), give, gaps[number, row], ways
+            )
+            step = arms.within_reach(number, row, step)
+            if (length := float(np.linalg.norm(step))) > _NONE:
+                # The next curve starts from this one, so that steps which it smooths do not add up.
+                part = touches[number, row]
+                targets[number, row] *= 1.0 - part
+                targets[number, row] += part * (result[number, row] + step)
+                farthest = max(farthest, part * length)
+        if farthest < _NONE:
             break
-        result += steps
-        for start, stop in spans_of(timing):
-            result[:, start:stop] = _smoothed(result[:, start:stop], _WIDTH * timing.frame_rate)
-        for number, arm in enumerate(_ARMS):
-            wanted = shifts[number] + result[number]
-            result[number] = _within_reach(body, arm, wanted) - shifts[number]
-    parts = rests_on[..., None].copy()
+        result = _faded(body, targets, person.holds, timing)
+    return result
+
+
+def _faded(body: _Body, targets: Floats, holds: Floats, timing: Timing) -> Floats:
+    """Return curves (2, N, 3) through targets at the skin, which fade around them, within reach."""
+    # Free rows pull the curve to 0 with a weight of 1, rows at the skin to their targets, so that
+    # waves longer than _STEADY pass.
+    result = np.empty_like(targets)
+    pulls = (_FADE / _STEADY) ** 4 * holds**_POWER
     for start, stop in spans_of(timing):
-        parts[:, start:stop] = _smoothed(parts[:, start:stop], _WIDTH * timing.frame_rate)
-    return parts * result
+        rows = slice(start, stop)
+        weights = 1.0 + pulls[:, rows]
+        aims = (pulls[:, rows] / weights)[..., None] * targets[:, rows]
+        result[:, rows] = smooth_curves(aims, weights, _FADE * timing.frame_rate)
+    return np.stack(
+        [_within_reach(body, arm, each) for arm, each in zip(_ARMS, result, strict=True)]
+    )
 
 
-def _smoothed(curves: Floats, width: float) -> Floats:
-    """Return the moving averages of curves (..., N, 3), with weights that fall linearly."""
-    from scipy.ndimage import convolve1d  # loads slowly, and only hands at the body need it
+def _side(other: _Body, number: int) -> Floats:
+    """Return the direction of a wrist from the nearest bone of the trunk: (N, 3)."""
+    bones = pairwise([name for name in _PARTS[0] if name in other.place])
+    ways = np.stack([_from_bone(other, _ARMS[number][2], *bone)[0] for bone in bones])
+    nearest = np.linalg.norm(ways, axis=2).argmin(axis=0)
+    side: Floats = unit(ways[nearest, np.arange(ways.shape[1])])
+    return side
 
-    half = max(1, round(width))
-    weights = 1.0 - np.abs(np.arange(-half, half + 1)) / (half + 1.0)
-    return np.asarray(convolve1d(curves, weights / weights.sum(), axis=-2, mode="nearest"))
+
+class _Arms:
+    """Arms of a body in some rows of its motion, as their wrists move."""
+
+    def __init__(self, body: _Body, rows: Ints) -> None:
+        self.index = {int(row): index for index, row in enumerate(rows)}
+        self.joints = [
+            (body.at(shoulder)[rows], body.at(elbow)[rows], body.at(wrist)[rows])
+            for shoulder, elbow, wrist in _ARMS
+        ]
+        across = self.joints[0][0] - self.joints[1][0]
+        uppers = [unscaled(body.world[rows, body.place[arm[0]], :3, :3]) for arm in _ARMS]
+        self.axes = [
+            hinges(upper, points, across) for upper, points in zip(uppers, self.joints, strict=True)
+        ]
+
+    def bend(self, shifts: Floats) -> None:
+        """Move the wrists by shifts (2, R, 3)."""
+        self.shifts = shifts
+        self.turns = [
+            [quaternion_to_matrix(turn) for turn in bend(*points, points[2] + shift, axis)]
+            for points, shift, axis in zip(self.joints, shifts, self.axes, strict=True)
+        ]
+
+    def moved(
+        self, arm: int, row: int, parts: Ints, points: Floats, normals: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return points and normals (P, 3) of the skin, of which some parts are of a bent arm."""
+        if (parts < 0).all():
+            return points, normals
+        index = self.index[row]
+        shoulder, elbow, _ = (each[index] for each in self.joints[arm])
+        upper, lower = (turn[index] for turn in self.turns[arm])
+        points, normals = points.copy(), normals.copy()
+        bent = shoulder + upper @ (elbow - shoulder)
+        for part, turn, before, after in ((0, upper, shoulder, shoulder), (1, lower, elbow, bent)):
+            own = parts == part
+            points[own] = after + (points[own] - before) @ turn.T
+            normals[own] = normals[own] @ turn.T
+        points[parts == 2] += self.shifts[arm, index]
+        return points, normals
+
+    def within_reach(self, arm: int, row: int, step: Floats) -> Floats:
+        """Return the step of a wrist: the arm can only swing about the shoulder at full length."""
+        index = self.index[row]
+        shoulder, elbow, wrist = (each[index] for each in self.joints[arm])
+        longest = _EXTENDED * (np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))
+        line = wrist + self.shifts[arm, index] - shoulder
+        outward = unit(line) @ step
+        if outward <= 0.0 or np.linalg.norm(line) < longest:
+            return step
+        # Along the tangent t, the way s out of the skin takes s^2 / t.
+        swing = step - outward * unit(line)
+        length, wished = float(np.linalg.norm(swing)), float(np.linalg.norm(step))
+        result: Floats = min(wished**2 / max(length, 1e-30), _FAST) * unit(swing)
+        return result
 
 
-def _way_out(points: Floats, others: Floats, normals: Floats, fractions: Floats) -> Floats:
-    """Return a translation (3,) of points (H, 3) out of the skin at other points (P, 3).
-
-    ``fractions``: (P, 1), how much of the way is gone.
-    """
+def _step(
+    points: Floats, others: Floats, normals: Floats, encloses: Callable[[Floats], Bools],
+    give: Floats, gap: float, ways: Floats,
+) -> Floats:  # fmt: skip
+    """Return a translation (3,) of points (H, 3) to a gap from the skin at other points (P, 3)."""
     nearest = ((others**2).sum(axis=1) - 2.0 * points @ others.T).argmin(axis=1)
     away, outward = points - others[nearest], normals[nearest]
     heights = np.einsum("ha,ha->h", away, outward)
-    inside = np.flatnonzero(heights < -_BEHIND * np.linalg.norm(away, axis=1))
-    result = np.zeros(3)
-    # The smallest translation out of the deepest point's plane, then out of those that are left.
-    for point in inside[heights[inside].argsort()]:
-        missing = -heights[point] - outward[point] @ result
-        result += max(missing, 0.0) * fractions[nearest[point]] * outward[point]
-    return result
+    distances = np.linalg.norm(away, axis=1)
+    aside = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
+    is_inside = heights < -_BEHIND * distances
+    # Behind the inner face of a piece of armour is no inside.
+    deep = np.flatnonzero(is_inside & (heights < -_UNSURE))
+    if len(deep):
+        is_inside[deep] = encloses(points[deep])
+    # Points of the skin are discs as wide as the distances between them.
+    clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - _DISC, 0.0)))
+    first = int(clear.argmin())
+    missing = np.maximum(gap - clear, 0.0)
+    if missing[first] <= 0.0:
+        # What is farther is another part than the source's hand touches.
+        excess = clear[first] - gap
+        near = float(falling(np.array((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))))
+        return -near * excess * give[nearest[first]] * unit(away[first])
+    # The mean direction out, on the side of the part on which the hand is.
+    out = (
+        outward
+        - np.minimum(np.einsum("ha,ha->h", outward, ways[nearest]), 0.0)[:, None] * ways[nearest]
+    )
+    way = unit(missing @ out)
+    cosine = max(float(way @ outward[first]), 0.5)
+    return min(missing[first] / cosine, _FAST) * give[nearest[first]] * way
 
 
 def _spread(points: Floats, count: int) -> Ints:
