@@ -15,7 +15,7 @@ from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.curve_skeleton import distinct_places, find_skeleton
 from viewer.autorig.limbs import tree as limb_tree
-from viewer.autorig.limbs.joints import bones_inside
+from viewer.autorig.limbs.joints import bones_inside, joint_points
 from viewer.autorig.limbs.sides import Plane, paired_chains
 from viewer.autorig.limbs.tree import Chain, Tree
 from viewer.autorig.limbs.trunk import footprint
@@ -326,6 +326,26 @@ def test_arms_of_a_kind_have_as_many_joints(monkeypatch, voxels):
             counts[joint] = counts[parent] + 1
     tips = {*range(skeleton.n_joints)} - {*skeleton.parents.tolist()}
     assert len(tips) == 8 and len({counts[tip] for tip in tips}) == 1
+
+
+def test_joint_that_keeps_a_bone_inside_is_one_of_a_kind():
+    # Two bends of 60 degrees. That of the last limb near its tip is too near for a bend, but a bone
+    # past it would leave the limb: it has as many joints as the others, with its own bend.
+    shapes, chains = [pipe([(0, 0, 0), (0, 0, 0.6)], 0.05)], []
+    for number, last in enumerate((0.88, 0.88, 0.92)):
+        turns = np.radians([0.0, 60.0, 0.0])
+        steps = np.diff([0.0, 0.5, last, 1.0])[:, None] * np.stack(
+            [np.cos(turns), np.sin(turns), np.zeros(3)], axis=1
+        )
+        corners = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        corners[:, 2] = 0.3 * number
+        shapes.append(pipe(corners, 0.03, around=12))
+        chains.append(Chain(0, -1, corners, 0.03, 0.0, frozenset({number})))
+    solid = solid_of(*united(*shapes), 128)
+    limbs = joint_points(solid, SimpleNamespace(chains=tuple(chains)), None, {}, 1.0)
+    assert [len(points) for points in limbs] == [3, 3, 3]
+    for points, chain in zip(limbs, chains, strict=True):
+        assert_allclose(points[:2], chain.points[1:3], atol=0.02)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])

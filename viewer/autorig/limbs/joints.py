@@ -111,7 +111,9 @@ def _plans(chains: tuple[Chain, ...], solid: Solid, factor: float) -> list[tuple
             axis=0,
         )
         for number, length in zip(kind, outer, strict=True):
-            if len(found[number]) != usual:
+            # A bend that is missing may be where another joint keeps the bone inside.
+            inside = bones_inside(chains[number], found[number], solid)
+            if usual not in (len(found[number]), len(inside)):
                 found[number] = chains[number].begin + length * shares
     return [
         _fractions(chain, lengths, bends, solid)
