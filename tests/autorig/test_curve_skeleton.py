@@ -15,6 +15,7 @@ from viewer.autorig import curve_skeleton
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.curve_skeleton import distinct_places, find_skeleton
 from viewer.autorig.limbs import tree as limb_tree
+from viewer.autorig.limbs import trunk as limb_trunk
 from viewer.autorig.limbs.joints import bones_inside, joint_points
 from viewer.autorig.limbs.sides import Plane, paired_chains
 from viewer.autorig.limbs.tree import Chain, Tree
@@ -393,6 +394,30 @@ def test_legs_of_a_table_are_pairs_around_its_middle(monkeypatch):
     assert {f"leg_{k}_{side}" for k in (1, 2) for side in ("left", "right")} <= {*joints}
     # The top is the trunk, and needs no joints.
     assert not [line for line in table.lines if "far from the skeleton" in str(line)]
+
+
+@pytest.mark.parametrize("away", [0.2, 0.9])
+def test_search_goes_on_between_limbs_outside_the_deepest_part(away):
+    # A ball of radius 0.4 on a bar, and three limbs whose ends inside the bar are around a place.
+    ball = pipe([(0, 0, -0.05), (0, 0, 0.05)], 0.4, around=16)
+    bar = pipe([(0, 0, 0), (0, 0, 1.2)], 0.2, around=16)
+    solid = solid_of(*united(ball, bar), 64)
+    ends = np.array([[0.1, 0.0, away], [-0.1, 0.0, away], [0.0, 0.0, away]])
+    chains = tuple(
+        Chain(0, -1, np.array([np.zeros(3), end, 3.0 * end]), 0.05, float(np.linalg.norm(end)),
+              frozenset({number}))
+        for number, end in enumerate(ends)
+    )  # fmt: skip
+    tree = SimpleNamespace(hubs=np.zeros((1, 3)), radii=np.array([0.4]), chains=chains)
+    assert_allclose(limb_trunk._between_limbs(tree), [0.0, 0.0, away])
+    assert limb_trunk._middle_of_plate(tree) is None
+    row = limb_trunk._middle(solid, tree, limb_trunk._between_limbs(tree))
+    # A place within the ball around the root is as good as the root.
+    if away < 0.4:
+        assert row is None
+    else:
+        # Not back in the ball, which is deeper.
+        assert abs(solid.centers(solid.voxels[row])[2] - away) <= 0.2 + solid.spacing
 
 
 def test_foot_has_the_root_in_its_middle_and_no_limb_at_its_rim(monkeypatch):

@@ -1,10 +1,11 @@
 """Trunk of a solid, where its skeleton has its root, and the limbs outwards from there.
 
 The tree of limbs is made twice: first from a deep voxel near the middle, to find the trunk, then
-from there. If that is far from the middle of a trunk that is a plate, such as the top of a table,
-it is made again from there, up to three times. The trunk is where most limbs meet, so that no
-branch has most of the tips; the foot of what stands on one limb, such as a plant or a robot's arm;
-the thick part between two limbs; or the thicker end of what has no branches.
+from there. If the trunk is where the first search began, but not between its limbs, or if it is a
+plate, such as the top of a table, and the search began far from its middle, the tree is made again
+from there, up to three times. The trunk is where most limbs meet, so that no branch has most of the
+tips; the foot of what stands on one limb, such as a plant or a robot's arm; the thick part between
+two limbs; or the thicker end of what has no branches.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
     if len(tree.chains):
         root = _trunk(solid, paths, tree, up)
         if root == source:
-            root = _middle_of_plate(solid, tree)
+            # From a spider's abdomen, which is deeper, legs of the other part look like one.
+            root = _middle(solid, tree, _between_limbs(tree))
     cuts = [tree.cuts]
     for _ in range(_ROUNDS):
         if root is None or root == tree.rows[0]:
@@ -60,7 +62,7 @@ def rooted_tree(solid: Solid, paths: Paths, up: Floats) -> Tree:
         # Loops stay cut.
         tree = tree_of(solid, paths, root)
         cuts.append(tree.cuts)
-        root = _middle_of_plate(solid, tree)
+        root = _middle(solid, tree, _middle_of_plate(tree))
     return replace(_centred(solid, tree), cuts=np.concatenate(cuts))
 
 
@@ -142,27 +144,30 @@ def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> tuple[Ints, bool]:
     return found, bool(ways[end] - ways[hub] >= _SLENDER * 2.0 * np.sqrt(extents[1]))
 
 
-def _middle_of_plate(solid: Solid, tree: Tree) -> int | None:
-    """Return the voxel in the middle of a trunk that is a plate, as a table's.
-
-    None for other trunks, and if the root is near that place.
-    """
-    middle = _between_limbs(tree)
-    if middle is None:
+def _middle(solid: Solid, tree: Tree, place: Floats | None) -> int | None:
+    """Return the voxel in the middle of a trunk around a place; None if the root is near it."""
+    if place is None:
         return None
     begins = [chain.begin for chain in tree.chains if chain.start == 0]
-    if np.linalg.norm(middle - tree.hubs[0]) <= _NEAR * np.median(begins):
-        return None
-    return _deepest_near(solid, middle)
+    # The second is less than the first in a plate.
+    near = max(_NEAR * float(np.median(begins)), float(tree.radii[0]))
+    return None if np.linalg.norm(place - tree.hubs[0]) <= near else _deepest_near(solid, place)
 
 
-def _between_limbs(tree: Tree) -> Floats | None:
-    """Return the middle (3,) of where limbs begin around a trunk that is a plate; None for others.
+def _middle_of_plate(tree: Tree) -> Floats | None:
+    """Return the middle (3,) of a trunk that is a plate, as a table's; None for other trunks.
 
     The deepest place may be where the plate and one leg meet.
     """
+    begins = [chain.begin for chain in tree.chains if chain.start == 0]
+    is_plate = len(begins) >= 3 and np.median(begins) > PLATE * tree.radii[0]
+    return _between_limbs(tree) if is_plate else None
+
+
+def _between_limbs(tree: Tree) -> Floats | None:
+    """Return the middle (3,) of where limbs begin around the trunk; None for less than three."""
     limbs = [chain for chain in tree.chains if chain.start == 0]
-    if len(limbs) < 3 or np.median([limb.begin for limb in limbs]) <= PLATE * tree.radii[0]:
+    if len(limbs) < 3:
         return None
     bases = [at_lengths(limb.points, np.array([limb.begin]))[0] for limb in limbs]
     middle: Floats = np.mean(bases, axis=0)
@@ -171,7 +176,7 @@ def _between_limbs(tree: Tree) -> Floats | None:
 
 def _centred(solid: Solid, tree: Tree) -> Tree:
     """Return a tree whose root is in the middle of a trunk that is a plate, not only near it."""
-    middle = _between_limbs(tree)
+    middle = _middle_of_plate(tree)
     if middle is None:
         return tree
     root = solid.centers(solid.voxels[_deepest_near(solid, middle)])
@@ -184,10 +189,11 @@ def _centred(solid: Solid, tree: Tree) -> Tree:
 
 
 def _deepest_near(solid: Solid, place: Floats) -> int:
-    """Return the deepest voxel around the one that is nearest to a place (3,)."""
+    """Return the deepest voxel in the ball around the one that is nearest to a place (3,)."""
     centers, radii = solid.centers(solid.voxels), solid.radii()
-    apart = np.linalg.norm(centers - centers[solid.nearest(place[None])[0]], axis=1)
-    near = np.flatnonzero(apart <= radii.max())
+    nearest = solid.nearest(place[None])[0]
+    apart = np.linalg.norm(centers - centers[nearest], axis=1)
+    near = np.flatnonzero(apart <= radii[nearest])  # not back to a deeper part beside it
     return int(near[np.lexsort((apart[near], -radii[near]))[0]])
 
 
