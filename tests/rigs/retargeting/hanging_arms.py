@@ -26,12 +26,13 @@ def body(arms: float = 1.0, width: float = 1.0, height: float = 1.0):
     return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
 
 
-def motion(bend: float, swing: float, down: float = 1.5):
+def motion(bend: float, swing: float, down: float = 1.5, rate: int = 30):
     """Return arms ``down`` radians below the horizontal, elbows ``bend`` +- ``swing`` radians."""
-    local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
-    phase = np.linspace(0.0, 2.0 * np.pi, N)
+    count = (N - 1) * rate // 30 + 1
+    local = np.tile(np.eye(3), (count, len(NAMES), 1, 1))
+    phase = np.linspace(0.0, 2.0 * np.pi, count)
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         local[:, NAMES.index(f"{side}Arm")] = matrices(-sign * down * Z)
         turns = -sign * Y * (bend + swing * np.sin(phase))[:, None]
         local[:, NAMES.index(f"{side}ForeArm")] = matrices(turns)
-    return written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    return written(t_pose(), worlds(local), np.zeros((count, 3)), rate=rate)

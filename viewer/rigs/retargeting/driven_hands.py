@@ -131,6 +131,7 @@ _SOLID = 0.25
 # Hands are moved in rounds, at most so far in each. Gaps that are wider than those of the source
 # by less than the first are closed, by more than the second are between other parts.
 _ROUNDS, _FAST, _PULL = 12, 0.12, (0.06, 0.12)
+_PLACED = 30.0  # frames per second in which hands are placed
 
 
 @dataclass(frozen=True, slots=True)
@@ -835,8 +836,16 @@ def _to_skin(
 
     ``aims``: (2, N, 3), first guesses; ``sides``: (2, N, 3), ways from the trunk to the hands.
     """
-    targets, touches = aims.copy(), person.touches
-    result = _faded(body, targets, person.holds, timing)
+    # Free rows pull the curve to 0 with a weight of 1, rows at the skin to their targets, so that
+    # waves longer than _STEADY pass. It also goes through rows between those that are placed.
+    pulls = (_FADE / _STEADY) ** 4 * person.holds**_POWER
+    every = max(round(timing.frame_rate / _PLACED), 1)
+    is_placed = np.zeros(aims.shape[1], dtype=bool)
+    for start, stop in spans_of(timing):
+        is_placed[start:stop:every] = True
+    pulls = np.where(is_placed, every * pulls, 0.0)
+    targets, touches = aims.copy(), np.where(is_placed, person.touches, 0.0)
+    result = _faded(body, targets, pulls, timing)
     # Hands that are in the body of the source may be as deep in the figure's.
     gaps = person.hand - np.clip(person.hand, -_UNSURE, _UNSURE)
     rows = np.flatnonzero(touches.any(axis=0)).astype(np.int32)
@@ -869,16 +878,16 @@ def _to_skin(
                 farthest = max(farthest, part * length)
         if farthest < _NONE:
             break
-        result = _faded(body, targets, person.holds, timing)
+        result = _faded(body, targets, pulls, timing)
     return result
 
 
-def _faded(body: _Body, targets: Floats, holds: Floats, timing: Timing) -> Floats:
-    """Return curves (2, N, 3) through targets at the skin, which fade around them, within reach."""
-    # Free rows pull the curve to 0 with a weight of 1, rows at the skin to their targets, so that
-    # waves longer than _STEADY pass.
+def _faded(body: _Body, targets: Floats, pulls: Floats, timing: Timing) -> Floats:
+    """Return curves (2, N, 3) through targets at the skin, which fade around them, within reach.
+
+    ``pulls``: (2, N), weights of the targets, relative to the weight of staying.
+    """
     result = np.empty_like(targets)
-    pulls = (_FADE / _STEADY) ** 4 * holds**_POWER
     for start, stop in spans_of(timing):
         rows = slice(start, stop)
         weights = 1.0 + pulls[:, rows]
