@@ -66,7 +66,7 @@ def test_stray_vertices_do_not_affect_the_size():
 
 def test_relative_lengths_ignore_stray_vertices():
     subject = Subject(Actor(cube([500.0, 500.0, 500.0])))
-    assert subject.length(0.4 * np.sqrt(3)) == "0.693 units (10 % of its size)"
+    assert subject.length(0.4 * np.sqrt(3)) == "0.693 units (10 % of the figure's size)"
 
 
 def test_largest_rotation_is_reported_in_degrees():
@@ -251,7 +251,7 @@ def test_lengths_without_a_unit_are_in_figure_units(tmp_path):
     (tmp_path / "a.skel").write_text(skel.replace("offset 0.0 2.0 0.0", "offset 0.0 3.0 0.0"))
     (bound,) = [f for f in linted(tmp_path, lines) if f.code == "B004"]
     # One unit of a column of 2 x 4 x 2 with a diagonal of sqrt(24).
-    values = {"n": 1, "joint": "knee", "distance": "1 units (20.4 % of its size)"}
+    values = {"n": 1, "joint": "knee", "distance": "1 units (20.4 % of the figure's size)"}
     assert told([bound.diagnostic]) == [("B004.joints", values)]
     assert bound.line == section(lines, "bindings") + 7
 

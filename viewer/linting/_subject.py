@@ -134,7 +134,7 @@ class Subject:
 
     def _relative(self, length: float) -> str:
         size = self.size()
-        return f" ({rounded(100.0 * length / size)} % of its size)" if size > 0.0 else ""
+        return f" ({rounded(100.0 * length / size)} % of the figure's size)" if size > 0.0 else ""
 
     def faults(self, faults: Iterable[Fault]) -> list[Finding]:
         """Return faults of the actor's figure as findings about it."""

@@ -61,15 +61,18 @@ def _elsewhere(
     matrices = np.where(usable[:, None, None], skin.inverse_bind, np.eye(4))
     bound = np.linalg.inv(matrices)[:, :3, 3]
     own = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
+    least = _ELSEWHERE * subject.size()
+    if _is_bound_at_zero(skeleton, bound[known], known, least):
+        return
     both = [np.linalg.norm(bound - joints, axis=1) for joints in (rest_joints(figure), own)]
     distances = min((np.where(known, part, 0.0) for part in both), key=np.max)
-    away = np.flatnonzero(distances > _ELSEWHERE * subject.size())
+    away = np.flatnonzero(distances > least)
     if len(away) == 0:
         return
     away = largest_first(away, distances)
     first = int(away[0])
     yield subject.found(
-        "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
+        "B004.joints: {n} from the rest pose (worst: {joint} by {distance}), so the mesh is "
         "deformed at rest",
         n=counted(
             len(away), "joint", "has a bind pose that differs", "have bind poses that differ"
@@ -79,6 +82,21 @@ def _elsewhere(
         joints=away,
         at=("bindings", first),
     )
+
+
+def _is_bound_at_zero(skeleton: Skeleton, bound: Floats, known: Bools, least: float) -> bool:
+    """Return whether joints are bound where they are with all DOFs 0, up to one translation.
+
+    Skins of the course are; the pose in the ``.skel`` and the root's motion move them from there.
+    ``bound``: bind positions (K, 3) of the known joints. ``least``: distance that is a difference.
+    """
+    pose = rest_pose(skeleton)
+    # One joint is always where another is, up to a translation.
+    if len(pose.dofs) == 0 or len(bound) < 2:
+        return False
+    pose.dofs[:] = 0.0
+    steps = bound - world_matrices(skeleton, pose)[known, :3, 3]
+    return bool(np.linalg.norm(steps - steps.mean(axis=0), axis=1).max() <= least)
 
 
 def _placed(subject: Subject, skeleton: Skeleton) -> Bools:
