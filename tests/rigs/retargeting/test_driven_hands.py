@@ -205,8 +205,9 @@ def test_hands_at_the_trunk_are_moved_out_of_a_stout_one(is_shaped):
         feet = [places(stout, each)[f"{side}Foot_"] for each in (found.clip, clip)]
         assert_allclose(*feet, atol=1e-9)
     notes = [str(note) for note in hand_notes(changes, found, replace(stout, unit="cm"))]
-    (text,) = [note for note in notes if "moved out" in note]
-    assert "--hand-contact off disables this" in text
+    (text,) = [note for note in notes if "hands of" in note]
+    assert f"moved by up to {10.0 * changes.moved:.0f} mm, as far from its skin as" in text
+    assert changes.moved > changes.moved_out and "--hand-contact off disables this" in text
 
 
 def comes_to_the_trunk(rate=30):

@@ -146,9 +146,11 @@ class KeptHands:
     """The same distance with straight arms: what is left because they are too short."""
     lifted: float = 0.0
     """Largest distance, in figure units, by which a hand was lifted to stay above the ground."""
+    moved: float = 0.0
+    """Largest distance, in figure units, by which a hand was moved to be as far from the skin as in
+    the source; 0 without a skin."""
     moved_out: float = 0.0
-    """Largest distance, in figure units, by which a hand was moved away from the trunk to be as far
-    from the skin as in the source."""
+    """The part of it that leads away from the trunk."""
 
 
 class _Body:
@@ -238,7 +240,7 @@ def keep_hands(
         ]
     )
     given_way = np.zeros_like(placed)
-    moved_out = 0.0
+    moved = moved_out = 0.0
     person = _Person(other, tips)
     if points is not None and differs and points.parts.min() < 0 and person.holds.any():
         solid = _Solid(points, body)
@@ -247,6 +249,7 @@ def keep_hands(
         given_way = _to_skin(body, solid, person, aims, sides, clip.timing) - placed
         outwards = float(np.einsum("hna,hna->hn", given_way, sides).max())
         moved_out = body.height * max(outwards, 0.0)
+        moved = body.height * float(np.linalg.norm(placed + given_way, axis=2).max())
     shifts = list(placed + given_way)
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
     lifts = _lifts(body, other, found, skin, up, shifts)
@@ -262,13 +265,11 @@ def keep_hands(
     )  # fmt: skip
     kept = replace(clip, rotations=rotations)
     lifted = body.height * float(lifts.max())
-    if not touches:
-        return kept, KeptHands(0.0, 0.0, lifted=lifted, moved_out=moved_out)
+    if not touches or moved:
+        return kept, KeptHands(0.0, 0.0, least, lifted, moved, moved_out)
     reached = _Body(skeleton, kept, mine, rests, crown=crown)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
-    # Where a hand was moved to a gap from the skin, it should be there.
-    missed = [shift + each for shift, each in zip(wished, given_way, strict=True)]
-    return kept, KeptHands(before, _error(missed, nearness), least, lifted, moved_out)
+    return kept, KeptHands(before, _error(wished, nearness), least, lifted)
 
 
 def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
@@ -300,13 +301,13 @@ def hand_notes(kept: KeptHands | None, found: Retargeted, figure: Figure) -> lis
                 least=100.0 * kept.least,
             )
         )
-    if kept.moved_out:
+    if kept.moved:
         notes.append(
             note(
-                "F007.hands-outside: hands of {figure} moved out by up to {length}, as far from "
-                "its skin as those of {motion} are from theirs; {remedy} disables this",
+                "F007.hands-moved: hands of {figure} moved by up to {length}, as far from its skin "
+                "as those of {motion} are from theirs; {remedy} disables this",
                 **called,
-                length=length_text(figure, kept.moved_out),
+                length=length_text(figure, kept.moved),
                 remedy=remedy,
             )
         )
