@@ -66,6 +66,7 @@ ENOUGH = 0.5
 _SURE = 0.75  # confidence below which a rig may be wrong
 
 _FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
+_UNLIKE = "this mesh is probably not a figure like the template, or not oriented as assumed"
 _REMEDY = (
     "use a template of the same kind (--from) or none (--auto), specify --up, --facing or "
     "--landmarks, or keep the rig if it is right (--keep-doubtful)"
@@ -190,15 +191,15 @@ def judge(
 
 
 def refusal(found: tuple[Finding, ...], facing: Diagnostic | None = None) -> str:
-    """Return the reasons not to keep a rig, and what helps; empty if it is probably right.
+    """Return what is wrong with a rig, what helps, and why; empty if it is probably right.
 
     ``facing``: the message that front and back look alike, and what helps if they are swapped.
     """
     reasons = "; ".join(str(line) for line in doubts(found))
     if not reasons:
         return ""
-    remedy = _REMEDY if facing is None else f"{facing}; else {_REMEDY}"
-    return f"the rig is probably wrong: {reasons}: {remedy}"
+    remedy = _REMEDY if facing is None else f"{facing}; otherwise {_REMEDY}"
+    return f"{_UNLIKE}; {remedy}; reasons: {reasons}"
 
 
 def findings(
@@ -214,13 +215,14 @@ def findings(
     scale = float(np.median(lengths))
     return (
         Finding(
-            "R017.surface: template and target are {value:.1%} of the size apart",
+            "R017.surface: template and mesh differ in shape by {value:.1%} of the size",
             misfit(alignment, False),
             *(_FOUND_LIMBS if alignment.has_limbs else _NO_LIMBS),
         ),
         # Without the cap of the misfit, by which hair counts as little as a missing limb.
         Finding(
-            "R017.covered: the target is {value:.1%} of its size away from the template",
+            "R017.covered: parts of the mesh are far from the template (RMS distance {value:.1%} "
+            "of the size of the mesh)",
             alignment.error,
             wrong=0.12,
             good=0.06,
@@ -234,7 +236,8 @@ def findings(
             good=0.5,
         ),
         Finding(
-            "R017.volume: a test pose keeps only {value:.0%} of the volume",
+            "R017.volume: the mesh collapses where joints bend (a test pose keeps {value:.0%} of "
+            "the volume that it keeps in the template)",
             _kept(target, parents, bones) / _kept(template, parents, bones),
             wrong=0.6,
             good=0.9,
@@ -268,7 +271,8 @@ def _bones_inside(template: Body, target: Body, bones: Ints, scale: float) -> tu
             good=0.7,
         ),
         Finding(
-            "R017.depth: bones are only {value:.2g} times as deep inside as in the template",
+            "R017.depth: the bones are outside the mesh or near its surface (at {value:.0%} of "
+            "their depth in the template)",
             float(np.median(other[inside] / (scale * own[inside]))),
             wrong=0.1,
             good=0.4,
@@ -344,7 +348,7 @@ def _posture(
         # Halfway: 40 degrees. Characters that are rigged well have up to 20, a bird with the arms
         # of a person in its wings 46, animals with two legs for four, or the reverse, 50 to 95.
         leaning = Finding(
-            "R017.trunk: the trunk leans {value:.0f} degrees more or less than in the template",
+            "R017.trunk: the lean of the trunk differs from the template's by {value:.0f} degrees",
             abs(angles[1] - angles[0]),
             wrong=55.0,
             good=25.0,
@@ -440,7 +444,8 @@ def _limbs_inside(
     # nearly all others are inside.
     return (
         Finding(
-            "R017.bone: only {value:.0%} of the bone that ends at {joint} is inside the mesh",
+            "R017.bone: most of the bone that ends at {joint} is outside the mesh ({value:.0%} is "
+            "inside)",
             float(parts[least]),
             wrong=0.2,
             good=0.6,
@@ -463,8 +468,8 @@ def _apart(
         ratios.append(float(gaps.min() / max(np.linalg.norm(joints[left] - joints[right]), 1e-12)))
     # People whose legs taper have 0.75 and more; with one leg missing, it is 0.3 to 0.5.
     return Finding(
-        "R017.apart: the legs are only {value:.0%} of the width of the hips apart (both may be in "
-        "the same one)",
+        "R017.apart: both legs of the rig may be in the same leg of the mesh (they are only "
+        "{value:.0%} of the width of the hips apart)",
         min(ratios),
         wrong=0.2,
         good=0.7,

@@ -13,6 +13,7 @@ from viewer.autorig.alignment import posed_alignment
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings, misfit
 from viewer.loading import bundled_body, load
+from viewer.rigs.geometry.rotation import rotation_vector_to_matrix
 from viewer.rigs.pose import rest_pose
 
 
@@ -60,10 +61,32 @@ def test_front_and_back_that_look_alike_are_both_fitted(twins):
     (line,) = questions(twins)
     assert line.severity == "warning" and twins.alike is line
     assert str(line) == (
-        f"front and back look alike: facing z leaves a gap of {gaps[0]:.2f} % of the size, "
-        f"facing -z {gaps[1]:.2f} %: check the front; if it is -z, specify --facing -z"
+        f"front and back look alike (facing z leaves a gap of {gaps[0]:.2f} % of the size, "
+        f"facing -z {gaps[1]:.2f} %), so check the front, and if it is -z, specify --facing -z"
     )
     assert twins.other.other is None and twins.other.alike is None
+
+
+def tilted(fit, angle):
+    """Return a fit of the template pitched by an angle in degrees, so that it faces up or down."""
+    alignment = fit.alignment
+    turn = rotation_vector_to_matrix(np.radians([angle, 0.0, 0.0]))
+    turned = replace(alignment.similarity, rotation=turn @ alignment.similarity.rotation)
+    even = replace(alignment, similarity=turned, uneven=(0.01, 0.01))
+    return replace(fit, alignment=even, lines=(), front="", other=None)
+
+
+def test_fit_that_leans_faces_no_axis_along_the_way_up(twins):
+    # After 80 degrees about x, +z has become about -y and -z about +y; level parts keep their side.
+    job = SimpleNamespace(
+        template=twins.figure, pose=rest_pose(twins.figure.skeleton), settings=AlignmentSettings()
+    )
+    fits = [tilted(fit, 80.0) for fit in (twins, twins.other)]
+    assert [ahead(fit)[1] < -0.9 for fit in fits] == [True, False]
+    found = posed_alignment._with_other(job, *fits)
+    assert (found.front, found.other.front) == ("z", "-z")
+    # Both fits face the same side: there is nothing to ask.
+    assert posed_alignment._with_other(job, fits[0], fits[0]).other is None
 
 
 @pytest.mark.parametrize(
@@ -72,7 +95,9 @@ def test_front_and_back_that_look_alike_are_both_fitted(twins):
 )
 def test_only_a_close_second_that_feet_do_not_exclude_is_asked_about(twins, feet, gap, is_asked):
     figure = twins.figure
-    job = SimpleNamespace(template=figure, pose=rest_pose(figure.skeleton))
+    job = SimpleNamespace(
+        template=figure, pose=rest_pose(figure.skeleton), settings=AlignmentSettings()
+    )
     fits = []
     for sign, each, size in ((1.0, twins, 0.01), (-1.0, twins.other, gap)):
         start = SimpleNamespace(

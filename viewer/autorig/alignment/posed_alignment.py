@@ -85,8 +85,8 @@ _ALIKE = 0.7
 
 
 ALIKE = (
-    "R004.facing: front and back look alike: facing {front} leaves a gap of {gap:.2f} % of the "
-    "size, facing {back} {other:.2f} %: check the front; if it is {back}, {remedy}"
+    "R004.facing: front and back look alike (facing {front} leaves a gap of {gap:.2f} % of the "
+    "size, facing {back} {other:.2f} %), so check the front, and if it is {back}, {remedy}"
 )
 FACING = ALIKE.partition(":")[0]
 """Key of this message."""
@@ -309,7 +309,13 @@ def _with_other(job: _Job, best: PosedAlignment, other: PosedAlignment) -> Posed
     if gaps[0] < _ALIKE * gaps[1]:
         return best
     ahead = np.cross(left_of(job.template, job.pose), axis_direction(job.template.up))
-    fronts = [nearest_axis(fit.alignment.similarity.rotation @ ahead) for fit in (best, other)]
+    # A fit may lean: an axis along the way up is no front.
+    level = np.eye(3) - np.outer(*2 * [axis_direction(job.settings.up or DEFAULT_UP)])
+    fronts = [
+        nearest_axis(level @ fit.alignment.similarity.rotation @ ahead) for fit in (best, other)
+    ]
+    if fronts[0] == fronts[1]:
+        return best
     values = {
         "front": fronts[0],
         "gap": 100.0 * gaps[0],
