@@ -149,8 +149,6 @@ class KeptHands:
     moved: float = 0.0
     """Largest distance, in figure units, by which a hand was moved to be as far from the skin as in
     the source; 0 without a skin."""
-    moved_out: float = 0.0
-    """The part of it that leads away from the trunk."""
 
 
 class _Body:
@@ -240,15 +238,13 @@ def keep_hands(
         ]
     )
     given_way = np.zeros_like(placed)
-    moved = moved_out = 0.0
+    moved = 0.0
     person = _Person(other, tips)
     if points is not None and differs and points.parts.min() < 0 and person.holds.any():
         solid = _Solid(points, body)
         aims = _at_skin(body, other, person, found.to_target, solid, np.stack(shifts))
         sides = np.stack([_side(other, number) @ found.to_target.T for number in range(len(_ARMS))])
         given_way = _to_skin(body, solid, person, aims, sides, clip.timing) - placed
-        outwards = float(np.einsum("hna,hna->hn", given_way, sides).max())
-        moved_out = body.height * max(outwards, 0.0)
         moved = body.height * float(np.linalg.norm(placed + given_way, axis=2).max())
     shifts = list(placed + given_way)
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
@@ -266,7 +262,7 @@ def keep_hands(
     kept = replace(clip, rotations=rotations)
     lifted = body.height * float(lifts.max())
     if not touches or moved:
-        return kept, KeptHands(0.0, 0.0, least, lifted, moved, moved_out)
+        return kept, KeptHands(0.0, 0.0, least, lifted, moved)
     reached = _Body(skeleton, kept, mine, rests, crown=crown)
     wished, _, _ = _shifts(reached, other, found.to_target, radii)
     return kept, KeptHands(before, _error(wished, nearness), least, lifted)
