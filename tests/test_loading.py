@@ -275,7 +275,8 @@ def test_missing_file_suggests_the_nearest_name(tmp_path):
 def test_folder_is_refused(tmp_path):
     wanted = (
         "expected a file, or a folder of PIG tables, EasyMocap frames or results of video motion "
-        "capture, found an unrecognised folder"
+        "capture, found an unrecognised folder (viewer batch runs a command on each file of a "
+        "folder)"
     )
     assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
     assert refusal("") == f".: {wanted}"

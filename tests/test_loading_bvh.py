@@ -104,7 +104,7 @@ def test_unknown_units_are_never_scaled(bvh):
     path = bvh(10)
     scene = load(path, bundled_body(), motion=BESIDE)
     assert units(scene) == ["m", ""]
-    assert scene.warnings == (f"{path}: unit unknown (skeleton 17 high); --unit overrides it",)
+    assert scene.warnings == (f"{path}: unit unknown (skeleton 17 high); state it with --unit",)
 
 
 @pytest.mark.parametrize(

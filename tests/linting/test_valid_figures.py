@@ -56,6 +56,15 @@ def test_skel_and_skin_files_have_only_known_findings(shared, names):
     assert "B004" not in notes(findings)
 
 
+def test_pose_outside_its_limits_is_described_in_radians_as_in_the_file(shared):
+    _, findings = lint_files([shared / "test.skel"])
+    (posed,) = [found for found in findings if found.code == "S004"]
+    assert posed.message == (
+        "3 DOFs of the pose set to the nearest of their limits "
+        "(first: knee_r.x is -3, rotxlimit is -2 0)"
+    )
+
+
 def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data):
     for name in ("PIG_core.pkl", "core_txt_files"):
         _, findings = lint_files([shared_data / "pig" / name])

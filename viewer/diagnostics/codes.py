@@ -52,7 +52,7 @@ CODES: dict[str, Code] = {
     "F004": Code("error", "incompatible files", "open files that belong together"),
     "F005": Code("warning", "missing texture or material library", "put it next to the file"),
     "F006": Code("warning", "unknown content", "remove it or correct its name"),
-    "F007": Code("note", "note about a file", "none if intentional"),
+    "F007": Code("note", "note about a file", "none if it is right; otherwise follow the note"),
     "F008": Code("error", "nothing that the viewer shows", "open a file with a mesh or a skeleton"),
     # Weights
     "W001": Code(

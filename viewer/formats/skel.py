@@ -27,10 +27,10 @@ from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.joint_parser import JointParser, Word, called_joint
 from viewer.formats._text.numbers import LARGEST, is_infinite, is_number
-from viewer.phrases import counted, optional, quoted, rounded
+from viewer.phrases import agree, counted, optional, quoted, rounded
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure
-from viewer.rigs.skeleton import DOF_KINDS, Skeleton, joint_label
+from viewer.rigs.skeleton import DOF_KINDS, Skeleton, dof_label, joint_label
 
 _JOINT = b"balljoint"
 _VECTORS = (b"offset", b"boxmin", b"boxmax", b"pose")
@@ -229,14 +229,25 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
-    from viewer.rigs.posing.dof_text import beyond_text
-
+    # In radians, as in the file.
     first = int(moved[0])
-    beyond = beyond_text(skeleton, first, float(dofs[first]))
-    values = {"n": counted(len(moved), "DOF"), "dof": beyond}
+    low, high = skeleton.dof_limits[first].tolist()
+    values = {
+        "n": counted(len(moved), "DOF"),
+        "their": agree(len(moved), "its", "their"),
+        "dof": dof_label(skeleton, first),
+        "value": float(dofs[first]),
+        "axis": DOF_KINDS[skeleton.dof_kinds[first]],
+        "low": low,
+        "high": high,
+    }
     joints = np.unique(skeleton.dof_joints[moved])
     clamped = Diagnostic(
-        "S004.clamped: {n} clamped: {dof}", part="joints", places=joints, values=values
+        "S004.clamped: {n} of the pose set to the nearest of {their} limits (first: {dof} is "
+        "{value:g}, rot{axis}limit is {low:g} {high:g})",
+        part="joints",
+        places=joints,
+        values=values,
     )
     return (("pose outside limits", clamped),)
 

@@ -200,9 +200,8 @@ def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
                 if one in chosen
                 else "F007.unit-taken: {note}{remedy}"
             )
-            draft.note(
-                key, one.path, note=one.motion.unit_note, remedy=Remedy("", "; --unit overrides it")
-            )
+            remedy = "; --unit overrides it" if one.motion.figure.unit else "; state it with --unit"
+            draft.note(key, one.path, note=one.motion.unit_note, remedy=Remedy("", remedy))
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
