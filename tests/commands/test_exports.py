@@ -75,6 +75,34 @@ def test_requests_that_cannot_be_met_are_refused(turning, tmp_path, settings, er
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_moved_figure_is_read_back_with_its_joints_and_path(tmp_path, speed):
+    figure = viewer.figure(
+        [[0, 0, 0], [1, 0, 0], [0, 2, 0]],
+        [[0, 1, 2]],
+        weights=[[1, 0], [1, 0], [0.25, 0.75]],
+        joints=[[0, 0.5, 0], [0, 1, 0]],
+        parents=[-1, 0],
+        names=["base", "tip"],
+        unit="m",
+    )
+    rotations = np.zeros((5, 2, 3))
+    rotations[:, :, 2] = np.linspace(0.0, 1.0, 5)[:, None]
+    path = np.array([3.0, 0, 1]) + speed * np.arange(5)[:, None] * [1, 0.25, 0]
+    actor = viewer.animate(figure, rotations, translations=path, fps=30)
+    viewer.export(actor, tmp_path / "own.glb")
+    read = viewer.load(tmp_path / "own.glb")[0]
+    assert read.figure.skeleton.names == ("base", "tip")
+    # A root that never moves is at rest where it stays.
+    moved = viewer.motion(read).translations
+    assert_allclose(moved - moved[0], path - path[0], atol=1e-6)
+    assert_allclose(read.joints()[:, 0], path + np.array([0, 0.5, 0]), atol=1e-6)
+    assert viewer.diff(actor, read).mpjpe < 1e-3  # mm
+    viewer.export(viewer.Scene([actor, actor]), tmp_path / "both.glb")
+    for each in viewer.load(tmp_path / "both.glb").actors:
+        assert each.figure.skeleton.names == ("base", "tip")
+
+
 def test_other_objects_are_refused(tmp_path):
     with pytest.raises(ViewerError, match=r"^export: expected a scene .*, found str; viewer.load"):
         viewer.export("fox", tmp_path / "own.glb")

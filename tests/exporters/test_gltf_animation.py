@@ -106,7 +106,8 @@ def test_moving_joints_get_channels(tmp_path):
 def test_constant_placement_gets_no_channel(tmp_path):
     animation = roof_animation(figure_translations=np.tile([1.0, 2, 3], (4, 1)))
     gltf, _ = write(tmp_path, animation)
-    assert gltf.nodes[gltf.named("roof")]["translation"] == [1, 2, 3]
+    assert "translation" not in gltf.nodes[0]  # the node around the figure
+    assert gltf.nodes[gltf.named("root")]["translation"] == [1, 2, 3]
     assert len(gltf.root["animations"][0]["channels"]) == 2
     assert_played(gltf, animation)
 

@@ -5,7 +5,8 @@
     z up, centimetres        rotated by -90 degrees about x if z is up, scaled to metres if the unit
     │                        is known and not the metre; omitted if neither applies
     └── the figure's name    figure_translation and figure_scale
-        ├── joints           T R S, by the figure's names
+        ├── joints           T R S, by the figure's names; the root has the figure_translation of
+        │                    sampled motions where it moves all there is
         ├── fixed            never moves; only if some vertices have no influence
         └── mesh             only if the mesh is not skinned; a skinned mesh is a root node
 

@@ -24,9 +24,9 @@ from viewer.exporters.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed
 from viewer.rigs.figure import figure_pose
 from viewer.rigs.geometry.vectors import SignedUp
-from viewer.rigs.motion.evaluation import Frames, frames_between
+from viewer.rigs.motion.evaluation import Frames, frames_between, root_translations
 from viewer.rigs.motion.sampled_animation import SampledAnimation
-from viewer.rigs.skeleton import joint_label
+from viewer.rigs.skeleton import Skeleton, joint_label
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +91,8 @@ def add_sampled(
     skeleton = body.figure.require_skeleton()
     rows = slice(*(span or (0, sampled.frames.n_frames)))
     part = frames_between(sampled.frames, rows)
+    if body.figure.mesh is None or (body.influences is not None and not body.influences.n_fixed):
+        part = _moved_by_root(skeleton, part)
     pose = figure_pose(animation.figure)
     rest = locals_of(skeleton, pose)
     pose.figure_translation = part.figure_translations[0]
@@ -115,6 +117,19 @@ def add_sampled(
     times = delay + np.arange(part.n_frames) / animation.frame_rate
     index = add_animation(document, title, times, skeleton, part, built.tree, morphs, into)
     return built, index
+
+
+def _moved_by_root(skeleton: Skeleton, frames: Frames) -> Frames:
+    """Return frames in which the only root moves instead of the figure, which is not scaled.
+
+    The node around the figure then has no effect, so that readers do not take it for a joint.
+    """
+    if np.sum(skeleton.parents < 0) != 1 or (frames.figure_scales != 1.0).any():
+        return frames
+    moved = frames.translations.copy()
+    moved[:, skeleton.parents < 0] = root_translations(skeleton, frames)[:, None]
+    still = np.zeros_like(frames.figure_translations)
+    return replace(frames, translations=moved, figure_translations=still)
 
 
 def written_part(path: Path, file: GltfFile, built: Built) -> Written:

@@ -261,6 +261,15 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
     )
 
 
+def root_translations(skeleton: Skeleton, frames: Frames) -> Floats:
+    """Return the translations of the figure, and of its root if there is only one: (F, 3)."""
+    roots = np.flatnonzero(skeleton.parents < 0)
+    if len(roots) != 1:
+        return frames.figure_translations
+    own: Floats = frames.figure_scales[:, None] * frames.translations[:, roots[0]]
+    return frames.figure_translations + own
+
+
 def world_frames(figure: Figure, frames: Frames) -> Floats:
     """Return world matrices of all frames (F, J, 4, 4), with the figure's own scale and place."""
     skeleton = figure.require_skeleton()

@@ -13,7 +13,7 @@ from viewer.near_names import name_hint
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
-from viewer.rigs.motion.evaluation import Frames, world_frames
+from viewer.rigs.motion.evaluation import Frames, root_translations, world_frames
 from viewer.rigs.motion.sampled_animation import sample_animation
 from viewer.rigs.scene import Actor
 
@@ -40,8 +40,8 @@ class MotionArrays:
     rotations: Floats
     """(F, J, 4). Quaternions (x, y, z, w) relative to the parent joint."""
     translations: Floats
-    """(F, 3). Translation of the whole figure, in its own space and unit: metres for captured
-    people."""
+    """(F, 3). Translation of the whole figure and of its root joint, if there is one root, in the
+    figure's space and unit: metres for captured people."""
     shape_weights: Floats
     """(F, S) or (1, S). Weights of the figure's blend shapes."""
     _figure: Figure
@@ -113,7 +113,7 @@ def motion(actor: Actor, interpolate: bool = False) -> MotionArrays:
         numbers.astype(np.int32),
         frames.present,
         frames.rotations,
-        frames.figure_translations,
+        root_translations(skeleton, frames),
         frames.shape_weights,
         sampled.figure,
         frames,
