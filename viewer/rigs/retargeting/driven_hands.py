@@ -231,22 +231,19 @@ def keep_hands(
     differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
     # The distances that are left to two hands add up.
     slack = _SLACK * (1.0 - 0.5 * together)
-    placed = np.stack(
-        [
-            _within_reach(body, arm, _beyond_slack(shift, slack))
-            for arm, shift in zip(_ARMS, _eased(shifts, nearness, clip.timing), strict=True)
-        ]
-    )
-    given_way = np.zeros_like(placed)
+    curves = [
+        _within_reach(body, arm, _beyond_slack(shift, slack))
+        for arm, shift in zip(_ARMS, _eased(shifts, nearness, clip.timing), strict=True)
+    ]
     moved = 0.0
     person = _Person(other, tips)
     if points is not None and differs and points.parts.min() < 0 and person.holds.any():
         solid = _Solid(points, body)
         aims = _at_skin(body, other, person, found.to_target, solid, np.stack(shifts))
         sides = np.stack([_side(other, number) @ found.to_target.T for number in range(len(_ARMS))])
-        given_way = _to_skin(body, solid, person, aims, sides, clip.timing) - placed
-        moved = body.height * float(np.linalg.norm(placed + given_way, axis=2).max())
-    shifts = list(placed + given_way)
+        curves = list(_to_skin(body, solid, person, aims, sides, clip.timing))
+        moved = body.height * float(np.linalg.norm(curves, axis=2).max())
+    shifts = curves
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
     lifts = _lifts(body, other, found, skin, up, shifts)
     if not touches and max(float(np.abs(shifts).max()), float(lifts.max())) < _NONE:
