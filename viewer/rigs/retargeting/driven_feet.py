@@ -205,8 +205,8 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         notes.append(note(key, **values))
 
     add(
-        "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after} "
-        "instead of {before} ({source} in {motion}); {remedy} disables this",
+        "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after}; "
+        "without planting, by {before} (in {motion}, by {source}); {remedy} disables this",
         **called,
         n=counted(changes.n_contacts, "contact"),
         source=text(changes.source),
@@ -215,8 +215,8 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         remedy=Remedy("Feet on the ground in the Actors panel", "--feet off"),
     )
     add(
-        "F007.feet-gap: soles of {figure} are at most {gap} from the ground during "
-        "contacts, instead of {gap_before}",
+        "F007.feet-gap: soles of {figure} are within {gap} of the ground during contacts; "
+        "without planting, within {gap_before}",
         figure=figure.name,
         gap_before=text(changes.gap_before),
         gap=text(changes.gap_after),
