@@ -95,7 +95,7 @@ def test_bound_bar_follows_the_bone_inside_and_shares_at_the_joint(method):
     # The result is the mesh itself, and the skeleton as it was given.
     assert rigged.figure.skeleton is figure.skeleton
     assert_allclose(deform(rigged.figure, rigged.pose)[0], mesh.positions, atol=1e-12)
-    assert str(rigged.lines[0]) == "skeleton: used where it is, 2 of 2 joints inside the mesh"
+    assert str(rigged.lines[0]) == "skeleton: not moved, 2 of 2 joints inside the mesh"
 
 
 @pytest.mark.parametrize("method", BINDING)
@@ -169,7 +169,7 @@ def test_part_that_two_sides_share_moves_with_the_joint_above_both(method):
             if not of(rigged, name).any()]  # fmt: skip
     assert "right" in idle and "middle" not in idle
     (line,) = [str(line) for line in rigged.lines if "no weights" in str(line)]
-    assert line.startswith(f"no weights: {', '.join(idle)}; the vertices around ")
+    assert line.startswith(f"no weights: {', '.join(idle)}; the parts of the mesh around ")
     # Of one line of joints, none is above branches: the part keeps its weights.
     line = box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), (1, 1, 1))
     shared = bound(skeleton_of(CHAIN), joined(line, box((3, 0, 0), (3.1, 0.1, 0.1), (1, 1, 1))))

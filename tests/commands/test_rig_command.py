@@ -452,7 +452,7 @@ def test_mesh_is_bound_to_a_skeleton_file(bar, tmp_path, capsys, method):
     said = capsys.readouterr()
     assert said.err == ""
     lines = said.out.splitlines()
-    assert lines[0] == "skeleton: used where it is, 1 of 1 joint inside the mesh"
+    assert lines[0] == "skeleton: not moved, 1 of 1 joint inside the mesh"
     assert "2 joints bound" in lines
     figure = viewer.load(out).actors[0].figure
     assert figure.skeleton.names == ("base", "tip")

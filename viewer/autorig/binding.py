@@ -322,7 +322,7 @@ def _placed_line(found: Similarity, inside: int, count: int, before: int | None)
     matrix = found.matrix
     if np.array_equal(matrix, np.eye(4)):
         return note(
-            "R001.skeleton: skeleton: used where it is, {inside} of {all} inside the mesh", **values
+            "R001.skeleton: skeleton: not moved, {inside} of {all} inside the mesh", **values
         )
     angle = float(np.degrees(rotation_distance(found.rotation, np.eye(3))))
     moved = {"scale": rounded(found.scale, 6), "angle": angle, **values}
@@ -449,11 +449,15 @@ def _weight_lines(mesh: Welded, found: BoneWeights, method: str) -> Iterator[Dia
         return
     sees = int((found.nearest >= 0).sum())
     if sees == count:
-        yield note("R005.heat-all: all {all} vertices see a bone", all=count)
+        yield note(
+            "R005.heat-all: weights by heat from the bones: straight lines inside the mesh lead to "
+            "a bone from all {all} vertices",
+            all=count,
+        )
         return
     yield note(
-        "R005.heat: {n} of {all} vertices see a bone; the others take their weights from the "
-        "surface around them",
+        "R005.heat: weights by heat from the bones: straight lines inside the mesh lead to a bone "
+        "from {n} of {all} vertices; the others take their weights from the surface around them",
         n=sees,
         all=count,
     )
@@ -477,8 +481,8 @@ def _bone_lines(skeleton: Skeleton, bones: Bones, skin: Skin) -> Iterator[Diagno
     moved = np.intersect1d(inner, idle_joints(skin, skeleton))
     if len(moved):
         yield note(
-            "R008.stiff-parts: no weights: {idle}; the vertices around {them} move with other "
-            "joints, as parts that do not bend do",
+            "R008.stiff-parts: no weights: {idle}; the parts of the mesh around {them} stay rigid "
+            "and follow other joints",
             them=agree(len(moved), "it", "them"),
             idle=listed([joint_label(skeleton, joint) for joint in moved.tolist()], 8),
         )

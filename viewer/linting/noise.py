@@ -205,8 +205,8 @@ def _unequal(subject: Subject, figure: Figure, found: Support) -> Finding | None
     rows = largest_first(rows, sizes)
     labels = joint_labels(figure.require_skeleton())
     return subject.found(
-        "W016.sides: weights of {n} differ between the sides without any pattern: {names} "
-        "(typically by {size}, most at vertex {vertex})",
+        "W016.sides: weights of {n} differ irregularly between left and right: {names} "
+        "(median difference {size}, largest at vertex {vertex})",
         n=counted(len(joints), "joint"),
         names=listed([labels[joint] for joint in joints]),
         size=rounded(float(np.median(sizes[rows])), 2),

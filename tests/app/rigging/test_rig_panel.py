@@ -427,7 +427,7 @@ def test_mesh_is_bound_to_a_skeleton_of_the_scene(drive, texts):
     results = hand.state.of(Rigging).results
     assert list(results) == ["heat", "voxel"] and hand.state.of(Rigging).comparison is not None
     line = str(results["heat"].rigged.lines[0])
-    assert line == "skeleton: used where it is, 1 of 1 joint inside the mesh"
+    assert line == "skeleton: not moved, 1 of 1 joint inside the mesh"
     for actor in (result.actor for result in results.values()):
         assert actor.figure.skeleton is bare.skeleton
         assert_allclose(deform(actor.figure, rest_pose(bare.skeleton))[0], mesh.mesh.positions,
