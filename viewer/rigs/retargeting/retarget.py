@@ -97,7 +97,7 @@ def retarget(
     if isinstance(source_rest, str) and has_one_up and _is_one_rig(source, target, matches):
         # Joints of one rig have the same axes, so they have the same local rotations whatever the
         # two files call the rest pose.
-        rotations = np.empty_like(target.rest_rotations)
+        rotations = source.rest_rotations.copy()
         rotations[matches.partners] = target.rest_rotations
         motion = with_rest_rotations(motion, rotations)
         job = _job(motion, motion.figure.require_skeleton(), (target, figure.up), matches)
