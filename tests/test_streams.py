@@ -196,8 +196,8 @@ def test_reserved_descriptors_are_released():
         "free = os.open(os.devnull, os.O_RDONLY)\n"
         "os._exit(0 if free == 0 else 1)\n"
     )
-    line = f'exec {sys.executable} -c "$1" <&- >&- 2>&-'
-    assert shell(line, program).returncode == 0
+    line = 'exec "$1" -c "$2" <&- >&- 2>&-'
+    assert shell(line, sys.executable, program).returncode == 0
 
 
 @pytest.mark.parametrize("suffix", [".anim", ".skel", ".bvh"])
