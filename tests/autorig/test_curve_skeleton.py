@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from autorig.rigged_shapes import KNEES, TRUNK, beast, mesh_of, pipe, turn, united
 from numpy.testing import assert_allclose
+from rendering.drawn_figures import sphere
 from scipy.spatial import ConvexHull
 
 import viewer
@@ -396,12 +397,12 @@ def test_legs_of_a_table_are_pairs_around_its_middle(monkeypatch):
     assert not [line for line in table.lines if "far from the skeleton" in str(line)]
 
 
-@pytest.mark.parametrize("away", [0.2, 0.9])
+@pytest.mark.parametrize("away", [0.2, 0.65, 0.9])
 def test_search_goes_on_between_limbs_outside_the_deepest_part(away):
     # A ball of radius 0.4 on a bar, and three limbs whose ends inside the bar are around a place.
-    ball = pipe([(0, 0, -0.05), (0, 0, 0.05)], 0.4, around=16)
+    ball = sphere(radius=0.4)
     bar = pipe([(0, 0, 0), (0, 0, 1.2)], 0.2, around=16)
-    solid = solid_of(*united(ball, bar), 64)
+    solid = solid_of(*united((ball.positions, ball.triangles), bar), 64)
     ends = np.array([[0.1, 0.0, away], [-0.1, 0.0, away], [0.0, 0.0, away]])
     chains = tuple(
         Chain(0, -1, np.array([np.zeros(3), end, 3.0 * end]), 0.05, float(np.linalg.norm(end)),
