@@ -229,21 +229,22 @@ def keep_hands(
     touches = any((np.linalg.norm(shift, axis=1) > _SLACK).any() for shift in shifts)
     # The proportions of the source are left alone: what its hands enter, it entered.
     differs = max(float(np.abs(shift).max()) for shift in shifts) > _SHORT
-    # The distances that are left to two hands add up.
-    slack = _SLACK * (1.0 - 0.5 * together)
-    curves = [
-        _within_reach(body, arm, _beyond_slack(shift, slack))
-        for arm, shift in zip(_ARMS, _eased(shifts, nearness, clip.timing), strict=True)
-    ]
-    moved = 0.0
-    person = _Person(other, tips)
-    if points is not None and differs and points.parts.min() < 0 and person.holds.any():
+    moved, person = 0.0, None
+    if points is not None and differs and points.parts.min() < 0:
+        person = _Person(other, tips)
+    if points is not None and person is not None and person.holds.any():
         solid = _Solid(points, body)
         aims = _at_skin(body, other, person, found.to_target, solid, np.stack(shifts))
         sides = np.stack([_side(other, number) @ found.to_target.T for number in range(len(_ARMS))])
-        curves = list(_to_skin(body, solid, person, aims, sides, clip.timing))
-        moved = body.height * float(np.linalg.norm(curves, axis=2).max())
-    shifts = curves
+        shifts = list(_to_skin(body, solid, person, aims, sides, clip.timing))
+        moved = body.height * float(np.linalg.norm(shifts, axis=2).max())
+    else:
+        # The distances that are left to two hands add up.
+        slack = _SLACK * (1.0 - 0.5 * together)
+        shifts = [
+            _within_reach(body, arm, _beyond_slack(shift, slack))
+            for arm, shift in zip(_ARMS, _eased(shifts, nearness, clip.timing), strict=True)
+        ]
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
     lifts = _lifts(body, other, found, skin, up, shifts)
     if not touches and max(float(np.abs(shifts).max()), float(lifts.max())) < _NONE:
