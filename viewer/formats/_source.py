@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import stat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -18,7 +18,7 @@ from viewer.diagnostics import Collector, Diagnostic, Part, Phrase, note, wordin
 from viewer.errors import FormatError, reason_of
 from viewer.formats._text.numbers import word_begins
 from viewer.interrupts import raising
-from viewer.phrases import Remedy, optional
+from viewer.phrases import Remedy, optional, quoted
 from viewer.progress import report_bytes
 
 _Content = TypeVar("_Content")
@@ -54,6 +54,7 @@ FOLDER = "a folder"
 # Maximum number of names in a folder that are compared with the name of a missing file.
 _MOST_FILES = 2000
 _ALIKE = 0.8  # minimum similarity; high, because many file names share a suffix and more
+_HINTED = 100  # diagnostics after which keywords are no longer compared: few of them are shown
 _MOST_LINKS = 8  # links to a descriptor: /dev/stdin has one, and users may add some
 _DESCRIPTORS = ("/dev/fd", "/proc/self/fd")
 _PIECE = 1 << 20  # bytes read from a pipe at once
@@ -251,6 +252,17 @@ class Source:
     ) -> None:
         """Record a warning or note that leaves the file valid; arguments as for ``refuse``."""
         self.diagnostics.add(self._diagnostic(key, offset, values, count, part, places))
+
+    def warn_unknown(self, word: bytes, offset: int, keywords: Iterable[bytes] = ()) -> None:
+        """Warn that a word which begins no item is skipped, and name the keywords like it."""
+        near = ""
+        if len(self.diagnostics) < _HINTED:
+            from viewer.near_names import near_names, question
+
+            known = [key.decode() for key in keywords]
+            near = question(near_names(word.decode(errors="replace"), known)[:1])
+        found = Phrase("{word} ({near})", word=quoted(word), near=near) if near else quoted(word)
+        self.warn(wording.UNKNOWN, offset, found=found)
 
     def _diagnostic(
         self,

@@ -223,7 +223,7 @@ def _read_line(source: Source, found: _Joints, start: int, words: list[bytes]) -
         found.n_weighted += 1
         return
     if word not in _COUNTS:
-        source.warn(wording.UNKNOWN, start, found=quoted(word))
+        source.warn_unknown(word, start, (*_COUNTS, b"skin"))
         return
     if len(words) < _COUNTS[word]:
         raise source.fault(

@@ -173,7 +173,7 @@ class _Parser(JointParser[_Joint]):
 
     def _skip_unknown(self, keyword: Word) -> None:
         """Skip an unknown word with its line and numbers, or with its whole balanced block."""
-        self.source.warn(wording.UNKNOWN, keyword.start(), found=quoted(keyword.group()))
+        self.source.warn_unknown(keyword.group(), keyword.start(), sorted(KEYWORDS))
         if keyword.group() != b"{":
             self.advance()
             # One warning for the whole line: "colour red" is a single unknown item.

@@ -11,9 +11,12 @@ from viewer.errors import FormatError
 from viewer.formats import Source, skel
 from viewer.rigs.pose import rest_pose
 
+NEAR = {"pos": "pose", "joint": "balljoint", "limits": "rotxlimit", "Offset": "offset"}
+
 
 def unknown(line, word):
-    return "F006.unknown", line, {"found": word.encode()}
+    hint = f'"{word}" (did you mean {NEAR.get(word)}?)'
+    return "F006.unknown", line, {"found": hint if word in NEAR else word.encode()}
 
 
 def test_all_values_of_a_valid_file_are_read():

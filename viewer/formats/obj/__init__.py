@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import wording
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._polygons import (
     Picks,
@@ -50,7 +49,7 @@ from viewer.formats.obj.lines import (
     read_faces,
 )
 from viewer.formats.obj.mtl import read_libraries
-from viewer.phrases import counted, listed, optional, quoted
+from viewer.phrases import counted, listed, optional
 from viewer.rigs.arrays import Bools, Floats, Ints, freeze
 from viewer.rigs.figure import Figure
 from viewer.rigs.material import Material
@@ -234,7 +233,7 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
             gathered.libraries.append((rest, offset))
         elif words[0] not in _QUIET:
             if words[0] not in _SHAPES and not gathered.odd[words[0]]:
-                source.warn(wording.UNKNOWN, offset, found=quoted(words[0]))
+                source.warn_unknown(words[0], offset, (b"usemtl", b"mtllib"))
             gathered.odd[words[0]] += 1
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
