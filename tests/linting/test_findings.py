@@ -29,6 +29,7 @@ from viewer.linting import (
     Finding,
     LintOptions,
     Subject,
+    finding_text,
     lint_files,
     lint_scene,
     places_of,
@@ -550,3 +551,9 @@ def test_missing_actors_have_no_location():
     nowhere = Finding(Diagnostic("W001.some: text"), actor=3, vertices=np.array([0]))
     assert points_of(nowhere, scene_of(column())).shape == (0, 3)
     assert len(places_of(nowhere, scene_of(column())).vertices) == 0
+
+
+def test_finding_as_text_is_the_first_line_of_the_report():
+    found = Finding(Diagnostic("W001.some: text", Path("a.glb")), name="knight", motion="Walk")
+    assert str(found.located(Path("a.glb"), 7)) == "a.glb:7: warning W001: knight: Walk: text"
+    assert finding_text(found).splitlines()[0] == "a.glb: warning W001: knight: Walk: text"

@@ -12,6 +12,8 @@ import numpy as np
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.diagnostics.codes import Severity
+from viewer.formats import folder_name
+from viewer.phrases import printable
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.inspection.faults import NO_INDICES
 
@@ -139,6 +141,22 @@ class Finding:
         pointer = self.diagnostic.pointer if pointer is None else pointer
         found = replace(self.diagnostic, path=file, line=line, pointer=pointer)
         return replace(self, diagnostic=found)
+
+    def __str__(self) -> str:
+        """Return place, severity, code and message, in one line."""
+        place, names = "", [self.motion]
+        if self.file is not None and self.file != Path():
+            place = self.place()
+            # The figure of a folder has the folder's name, but its findings name a file inside it.
+            folders = self.file.parent.name, folder_name(self.file.parent)
+            if self.name not in (self.file.stem, self.file.name, *folders):
+                names = [self.name, self.motion]
+        elif self.name:
+            place = printable(self.name, 100)
+        who = "".join(f"{printable(name, 100)}: " for name in names if name)
+        head = f"{place}: " if place else ""
+        text = f"{self.severity} {self.code}: {who}{printable(self.message, 2000)}"
+        return f"{head}{text}"
 
     def place(self, longest: int = 300, is_short: bool = False) -> str:
         """Return ``file:line`` or ``file#pointer``, or what is known; short without the folder."""

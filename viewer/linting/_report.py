@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.diagnostics import SEVERITIES, described
-from viewer.formats import folder_name
 from viewer.linting._finding import Finding
 from viewer.phrases import as_data, counted, printable
 from viewer.rigs.scene import Scene
@@ -27,19 +26,7 @@ def worst_first(findings: Sequence[Finding]) -> list[Finding]:
 
 def finding_text(finding: Finding) -> str:
     """Return one finding in the format of compilers, so that editors can jump to file and line."""
-    place, names = "", [finding.motion]
-    if finding.file is not None and finding.file != Path():
-        place = finding.place()
-        # The figure of a folder has the folder's name, but its findings name a file inside it.
-        folders = finding.file.parent.name, folder_name(finding.file.parent)
-        if finding.name not in (finding.file.stem, finding.file.name, *folders):
-            names = [finding.name, finding.motion]
-    elif finding.name:
-        place = printable(finding.name, 100)
-    who = "".join(f"{printable(name, 100)}: " for name in names if name)
-    head = f"{place}: " if place else ""
-    text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
-    return f"{head}{text}\n    {finding.title}; remedy: {finding.hint}"
+    return f"{finding}\n    {finding.title}; remedy: {finding.hint}"
 
 
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
