@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import percentile_filter
 
 from viewer.data_classes import dataclass
 from viewer.rigs.arrays import Bools, Floats, Ints, blocks_of_rows, runs_of
@@ -147,6 +146,8 @@ def _paces(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
 ) -> Floats:
     """Return how many times faster than in a walk the feet swing around each row: (N,), 1 to 4."""
+    from scipy.ndimage import percentile_filter
+
     # Steps of a run are shorter, and its feet stand less still: they roll faster from heel to ball.
     across, result = along_ground(up), np.ones(len(feet[0].toe))
     for first, last in spans:
