@@ -75,8 +75,11 @@ def test_requests_that_cannot_be_met_are_refused(turning, tmp_path, settings, er
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize("speed", [0.0, 0.5])
-def test_moved_figure_is_read_back_with_its_joints_and_path(tmp_path, speed):
+@pytest.mark.parametrize(
+    ("speed", "up", "unit"),
+    [(0.0, "y", "m"), (0.5, "y", "m"), (0.0, "z", "m"), (0.5, "z", "cm"), (0.5, "y", "in")],
+)
+def test_moved_figure_is_read_back_with_its_joints_and_path(tmp_path, speed, up, unit):
     figure = viewer.figure(
         [[0, 0, 0], [1, 0, 0], [0, 2, 0]],
         [[0, 1, 2]],
@@ -84,7 +87,8 @@ def test_moved_figure_is_read_back_with_its_joints_and_path(tmp_path, speed):
         joints=[[0, 0.5, 0], [0, 1, 0]],
         parents=[-1, 0],
         names=["base", "tip"],
-        unit="m",
+        unit=unit,
+        up=up,
     )
     rotations = np.zeros((5, 2, 3))
     rotations[:, :, 2] = np.linspace(0.0, 1.0, 5)[:, None]
@@ -93,6 +97,7 @@ def test_moved_figure_is_read_back_with_its_joints_and_path(tmp_path, speed):
     viewer.export(actor, tmp_path / "own.glb")
     read = viewer.load(tmp_path / "own.glb")[0]
     assert read.figure.skeleton.names == ("base", "tip")
+    assert (read.figure.up, read.figure.unit) == (up, unit)
     # A root that never moves is at rest where it stays.
     moved = viewer.motion(read).translations
     assert_allclose(moved - moved[0], path - path[0], atol=1e-6)

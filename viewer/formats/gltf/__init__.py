@@ -38,6 +38,7 @@ from viewer.formats.gltf.materials import DEFAULT_MATERIAL, DRAWN_EXTENSIONS, re
 from viewer.formats.gltf.meshes import node_weights, read_meshes
 from viewer.formats.gltf.nodes import (
     checked_bindings,
+    in_own_axes,
     read_cameras,
     read_skins,
     read_tree,
@@ -47,7 +48,8 @@ from viewer.formats.gltf.nodes import (
 from viewer.formats.gltf.toon import stored_textures, stored_toon
 from viewer.phrases import agree, counted, listed
 from viewer.rigs.figure import FigureGroup
-from viewer.rigs.file_record import Json
+from viewer.rigs.file_record import GENERATOR, Json
+from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.hierarchy import descendants
 
 if TYPE_CHECKING:
@@ -58,7 +60,11 @@ _MOTION = "VRMC_vrm_animation"
 
 
 def read(source: Source) -> FigureGroup | SkeletonMotion:
-    """Read figures and cameras in metres, with ball joints, or the motion of a ``.vrma`` file."""
+    """Read figures and cameras with ball joints, or the motion of a ``.vrma`` file.
+
+    They are in metres with y up, except for figures that this program wrote from other axes or
+    units, which get those again.
+    """
     file = read_nodes(source)
     if isinstance(file.extensions.get(_MOTION), dict):
         from viewer.formats._vrm.animation import read_motion
@@ -83,11 +89,19 @@ def read_nodes(source: Source) -> NodeFile:
         meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
         materials = (*materials, DEFAULT_MATERIAL)
     root, extensions = document.root, _object(document, "extensions")
+    asset, roots = _object(document, "asset"), shown_roots(document, tree)
+    moved = set[int]().union(*(animation.nodes for animation in animations))
     is_vrm = not _VRM.isdisjoint(extensions)
+    up: Up = "y"
+    unit = "m"
+    if asset.get("generator") == GENERATOR and not is_vrm:
+        tree, roots, up, unit = in_own_axes(tree, roots, moved)
     return NodeFile(
         name=source.path.stem,
         tree=tree,
-        roots=shown_roots(document, tree),
+        roots=roots,
+        up=up,
+        unit=unit,
         meshes=meshes,
         skins=skins,
         materials=materials,
@@ -96,7 +110,7 @@ def read_nodes(source: Source) -> NodeFile:
         part_views=dict.fromkeys(hidden_nodes(document, tree), "hidden"),
         extensions=extensions,
         extras=root.values.get("extras"),
-        asset=_object(document, "asset"),
+        asset=asset,
         scene=shown_scene(document),
         unkept=partial(unkept_members, root.values),
         contents=partial(contents_of, root.values),

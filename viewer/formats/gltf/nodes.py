@@ -8,6 +8,8 @@ a figure can be shown without them.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -31,8 +33,10 @@ from viewer.rigs.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
+from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.hierarchy import cycle_members, roots_of
 from viewer.rigs.inspection.faults import UNIT_ROTATION
+from viewer.rigs.units import METRES, UNIT_NAMES
 
 _TINY = 1e-12  # minimum length of a quaternion with a direction
 
@@ -47,6 +51,7 @@ _BINDING_LAST_ROW = 1e-4
 _ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
+_Z_TO_Y = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 
 
@@ -219,6 +224,60 @@ def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
     sizes = np.abs(linear).max(axis=(1, 2))
     is_exact = np.abs(again - linear).max(axis=(1, 2)) <= _EXACT * sizes
     return rotations, scales, is_exact
+
+
+def in_own_axes(
+    tree: NodeTree, roots: tuple[int, ...], moved: AbstractSet[int]
+) -> tuple[NodeTree, tuple[int, ...], Up, str]:
+    """Return the nodes of a file of this program without those that only convert to metres, y up.
+
+    Such nodes are the topmost ones of figures that were written from other axes or units (see
+    ``viewer.exporters.gltf.nodes``). The up axis and the unit from which they convert are returned
+    with the nodes; ``"y"`` and ``"m"`` with all nodes unless every figure has the same. Nodes in
+    ``moved`` are animated.
+    """
+    kept: tuple[NodeTree, tuple[int, ...], Up, str] = tree, roots, "y", "m"
+    skinned = (tree.meshes >= 0) & (tree.skins >= 0)
+    tops = [root for root in roots if not skinned[root]]
+    if (tree.cameras >= 0).any() or not moved.isdisjoint(tops):
+        return kept
+    # Among several figures, a node with the figure's name may be above.
+    nodes = [_below_bare(tree, top) for top in tops]
+    found = {_conversion(tree, node) for node in nodes}
+    own = found.pop() if len(found) == 1 and moved.isdisjoint(nodes) else None
+    if own is None:
+        return kept
+    is_freed = np.isin(tree.parents, nodes)
+    freed = replace(tree, parents=np.where(is_freed, -1, tree.parents).astype(np.int32))
+    shown = (root for root in roots if skinned[root])
+    return freed, (*np.flatnonzero(is_freed).tolist(), *shown), *own
+
+
+def _below_bare(tree: NodeTree, node: int) -> int:
+    """Return the only child of a node that does nothing but name it; other nodes themselves."""
+    below = np.flatnonzero(tree.parents == node)
+    is_bare = len(below) == 1 and _does_only(tree, node, _NO_ROTATION, 1.0)
+    return int(below[0]) if is_bare else node
+
+
+def _conversion(tree: NodeTree, node: int) -> tuple[Up, str] | None:
+    """Return the up axis and unit from which a node without other contents converts, if it does."""
+    names = tree.names[node].split(", ")
+    up: Up = "z" if names[0] == "z up" else "y"
+    units = [unit for unit, name in UNIT_NAMES.items() if name in names] or ["m"]
+    if len(names) != (up == "z") + (units[0] != "m"):
+        return None
+    rotation = _Z_TO_Y if up == "z" else _NO_ROTATION
+    return (up, units[0]) if _does_only(tree, node, rotation, METRES[units[0]]) else None
+
+
+def _does_only(tree: NodeTree, node: int, rotation: Sequence[float], scale: float) -> bool:
+    """Return whether a node only rotates and scales what is below it."""
+    transform = np.concatenate([tree.translations[node], tree.rotations[node], tree.scales[node]])
+    expected = np.concatenate([np.zeros(3), rotation, np.full(3, scale)])
+    if node in tree.matrices or node in tree.extras or node in tree.extensions:
+        return False
+    return tree.meshes[node] < 0 and bool(np.allclose(transform, expected, 1e-6, 0.0))
 
 
 def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
