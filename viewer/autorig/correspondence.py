@@ -27,7 +27,14 @@ from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.closest_point import Surface, SurfacePoints, interpolate
 from viewer.rigs.geometry.topology import CLOSED, Indices, components, edges_of, part_volumes
 from viewer.rigs.geometry.vectors import unit
-from viewer.rigs.mesh import Mesh, area_vectors, side_lengths, vertex_normals
+from viewer.rigs.mesh import (
+    Mesh,
+    area_vectors,
+    bounding_box,
+    box_size,
+    side_lengths,
+    vertex_normals,
+)
 
 _INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
@@ -108,11 +115,20 @@ class Matches:
 
 
 class Template:
-    """The template's surface, aligned with the targets to match; ``RigError`` without triangles."""
+    """The template's surface, aligned with the targets to match; ``RigError`` without triangles.
 
-    def __init__(self, positions: Floats, triangles: Ints) -> None:
+    ``unfitted`` (V, 3): the surface in its own proportions, if the aligned one has others; it is
+    scaled to the same size.
+    """
+
+    def __init__(self, positions: Floats, triangles: Ints, unfitted: Floats | None = None) -> None:
         self.surface = Surface(positions, triangles)
         self.positions, self.triangles = positions, triangles
+        self.unfitted: Floats | None = None
+        if unfitted is not None:
+            used = triangles.ravel()
+            size, own = (box_size(bounding_box(each[used])) for each in (positions, unfitted))
+            self.unfitted = unfitted * (size / own)
         self.welded = weld(positions, triangles)
         normals = vertex_normals(self.welded.positions, self.welded.triangles)
         self.normals: Floats = normals[self.welded.vertices]
@@ -120,6 +136,26 @@ class Template:
     def normals_at(self, points: SurfacePoints) -> Floats:
         """Return unit normals at points of the surface, (N, 3), interpolated from the corners."""
         return unit(interpolate(points, self.triangles, self.normals))
+
+    def crowding(self, target: Welded, points: SurfacePoints, matched: Bools) -> Floats:
+        """Return how much farther the matches of neighbours are apart than the neighbours: (W,).
+
+        Measured in the template's own proportions. Where these were squeezed to fit a target, the
+        surface of an arm or a neck may be in that of a chest, and each match is uncertain by this.
+        """
+        result = np.zeros(len(matched))
+        if self.unfitted is None:
+            return result
+        links = edges(target.triangles)
+        links = links[matched[links].all(axis=1)]
+        there = interpolate(points, self.triangles, self.unfitted)
+        apart, near = (
+            np.linalg.norm(places[links[:, 1]] - places[links[:, 0]], axis=1)
+            for places in (there, target.positions)
+        )
+        for ends in links.T:
+            np.maximum.at(result, ends, apart - near)
+        return result
 
 
 def sheet_normals(mesh: Welded) -> Floats:

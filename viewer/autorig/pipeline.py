@@ -44,7 +44,7 @@ from viewer.rigs.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rigs.pose import Pose
 from viewer.rigs.shape import pose_weights, shaped
 from viewer.rigs.skeleton import Skeleton, joint_label
-from viewer.rigs.skinning import joint_matrices
+from viewer.rigs.skinning import deform, joint_matrices
 from viewer.rigs.units import UNIT_NAMES, unit_of_scaled
 
 _AT_JOINT = 1e-6  # distance of a landmark from a joint, as a fraction of the skeleton's size
@@ -94,9 +94,11 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     given, alignment, pose, posed = pose, met.alignment, met.pose, met.positions
     plain, original, template = template, template.skeleton, met.figure
     aligned = alignment.similarity.apply(posed)
+    # In the same pose, so that skin that is folded at a joint is not taken for squeezed skin.
+    unfitted = None if template is plain else deform(plain, met.pose)[0]
     with part_of_work(span=(0.4, 0.8)):
         weights = transferred_weights(
-            Template(aligned, template.require_mesh().triangles),
+            Template(aligned, template.require_mesh().triangles, unfitted),
             template.require_skin(),
             target.positions,
             target.triangles,

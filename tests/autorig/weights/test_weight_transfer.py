@@ -667,9 +667,8 @@ def test_large_patch_on_another_limb_keeps_its_matches():
     assert found.matched.all()
 
 
-def test_weights_diffuse_over_twice_the_distance_from_the_template():
-    # Of a sheet 0.2 above one with a step of the weights, w - l^2 w'' = step with l = 0.4: the
-    # solution is exp(-|x| / l) / 2 on one side, and 1 minus that on the other.
+def sheet_with_a_step():
+    """Return a sheet 10 wide along x, and weights that jump from one joint to the next at x = 0."""
     x, y = np.linspace(-4.975, 4.975, 200), np.linspace(0.0, 1.0, 5)
     positions = np.stack([*np.meshgrid(x, y), np.zeros((5, 200))], axis=2).reshape(-1, 3)
     index = np.arange(1000).reshape(5, 200)
@@ -678,6 +677,13 @@ def test_weights_diffuse_over_twice_the_distance_from_the_template():
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
     right = positions[:, 0] > 0.0
     skin = skin_from_entries(1000, np.arange(1000), right.astype(int), np.ones(1000), BIND)
+    return positions, triangles, right, skin
+
+
+def test_weights_diffuse_over_twice_the_distance_from_the_template():
+    # Of a sheet 0.2 above one with a step of the weights, w - l^2 w'' = step with l = 0.4: the
+    # solution is exp(-|x| / l) / 2 on one side, and 1 minus that on the other.
+    positions, triangles, right, skin = sheet_with_a_step()
     above, template = positions + np.array([0.0, 0.0, 0.2]), Template(positions, triangles)
     found = transferred_weights(template, skin, above, triangles, WeightSettings())
     assert found.matched.all()
@@ -686,4 +692,22 @@ def test_weights_diffuse_over_twice_the_distance_from_the_template():
     # Within half a percent of the size, they are copied.
     near = positions + np.array([0.0, 0.0, 0.04])
     found = transferred_weights(template, skin, near, triangles, WeightSettings())
+    np.testing.assert_allclose(dense(found)[:, 1], right, atol=1e-12)
+
+
+def test_weights_diffuse_over_twice_the_length_that_was_squeezed():
+    positions, triangles, right, skin = sheet_with_a_step()
+    # Before it was fitted, every second column of the template was 0.25 higher. Scaled to the same
+    # size, columns 0.05 apart were sqrt(0.05^2 + 0.25^2) apart.
+    unfitted = positions.copy()
+    unfitted[1::2, 2] = 0.25
+    scale = np.sqrt(9.95**2 + 1.0) / np.sqrt(9.95**2 + 1.0 + 0.25**2)
+    length = 2.0 * (scale * np.hypot(0.05, 0.25) - 0.05)
+    tail = 0.5 * np.exp(-np.abs(positions[:, 0]) / length)
+    squeezed = Template(positions, triangles, unfitted)
+    found = transferred_weights(squeezed, skin, positions, triangles, WeightSettings())
+    np.testing.assert_allclose(dense(found)[:, 1], np.where(right, 1.0 - tail, tail), atol=0.005)
+    # One that was only smaller gives its weights unchanged.
+    smaller = Template(positions, triangles, 0.1 * positions)
+    found = transferred_weights(smaller, skin, positions, triangles, WeightSettings())
     np.testing.assert_allclose(dense(found)[:, 1], right, atol=1e-12)

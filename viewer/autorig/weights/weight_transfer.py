@@ -11,7 +11,9 @@ but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
 
 Closest points on a template of another shape jump from limb to limb. A match at distance d says to
 about 2d where on the limb a vertex is, so its weights diffuse that far over the surface
-(``_settled``). Near the template, weights are copied exactly.
+(``_settled``). So do those of vertices whose neighbours are matched d farther away on the template
+in its own proportions: the shoulders of a person, squeezed into a figure with a large head, are in
+its chest. Near the template, weights are copied exactly.
 """
 
 from __future__ import annotations
@@ -126,6 +128,8 @@ def transferred_weights(
     inpainted = ~found.matched & has_match[target.islands]
     distances = found.points.distances / size
     distances = np.where(inpainted, np.maximum(distances, settings.match.max_distance), distances)
+    crowding = template.crowding(target, found.points, found.matched) / size
+    distances = np.maximum(distances, crowding)
     loose = (distances > settings.match.near_distance) & has_match[target.islands]
     method = "direct"
     if loose.any():
