@@ -58,9 +58,9 @@ _RETURN = 0.05  # rotation towards the pose at the start that leaves the joint i
 _AVOID, _ROOM = 0.3, np.radians(25.0)
 _GLIDE = np.radians(4.0)  # rotation towards a target that rests, per call
 _MARGIN = 1.25  # of what a step needs, which is known by its linearisation
-# Maximum steps per call towards the target, in a search for another pose, and to shorten the
-# rotation: they bound the time of a frame.
-_DRAG_ROUNDS, _SEARCH_ROUNDS, _SHORTENING_ROUNDS = 8, 3, 4
+# Maximum steps per call towards the target and in a search for another pose, rejected ones
+# included, and rounds to shorten the rotation: they bound the time of a frame.
+_DRAG_STEPS, _SEARCH_STEPS, _SHORTENING_ROUNDS = 8, 3, 4
 _SLOW = 1e-3  # relative decrease of the error below which a drag has settled
 # Distance to the target from which a joint may be held by limits or a straight chain, and movement
 # of the target after which other poses are tried again, of the chain's length.
@@ -293,7 +293,7 @@ class Reaching:
             most = _RATE * moved * min(max(1.0, _MARGIN * needs), _MOST_NEEDED)
         self._target, self._wanted = target, wanted
         goal = self._eased(self._goal, _RATE * moved, inverse)
-        goal, is_settled = self._nearest(goal, _DRAG_ROUNDS, _SLOW)
+        goal, is_settled = self._nearest(goal, _DRAG_STEPS, _SLOW)
         if moved > 0.0:
             goal = self._shortened(goal, self._goal.values, _RATE * moved)
         self._since_held += moved
@@ -401,38 +401,44 @@ class Reaching:
         """Return the distance to the target that is solved for."""
         return math.dist(self._wanted, state.place)
 
-    def _nearest(self, state: _State, rounds: int, slow: float) -> tuple[_State, bool]:
+    def _nearest(self, state: _State, steps: int, slow: float) -> tuple[_State, bool]:
         """Return the state whose joint is nearest to the target, and whether the search ended.
 
         It also ends where the distance decreases by less than ``slow`` of itself.
         """
-        for _ in range(rounds):
+        while steps > 0:
             distance = self._left(state)
             if distance <= _CLOSE * self._size:
                 return state, True
-            better = self._improved(state, slow)
+            better, steps = self._improved(state, slow, steps)
             if better is None:
-                return state, True
+                return state, steps > 0
             state = better
             if distance - self._left(state) < slow * distance:
                 return state, True
         return state, False
 
-    def _improved(self, state: _State, slow: float = 0.0) -> _State | None:
-        """Return the state after one step that reduces the error; None if there is none."""
+    def _improved(self, state: _State, slow: float, steps: int) -> tuple[_State | None, int]:
+        """Return the state after one step that reduces the error, and the number of steps left.
+
+        None if there is no such step, or if no steps are left: another call may find one.
+        """
         error, distance = self._wanted - state.place, self._left(state)
         while self._damping <= _MOST_DAMPING:
+            if not steps:
+                return None, 0  # the next call goes on with this damping
             step = self._step(state, error, self._damping)
             promised = float(error @ (state.jacobian @ step))
             if np.abs(step).max() < _STILL or promised < slow * distance**2:
                 break
             better = state.at(state.values + step)
+            steps -= 1
             if self._left(better) < distance:
                 self._damping = max(0.3 * self._damping, _LEAST_DAMPING)
-                return better
+                return better, steps
             self._damping *= 4.0
         self._damping = _FIRST_DAMPING
-        return None
+        return None, max(steps, 1)
 
     def _step(
         self, state: _State, error: Floats, damping: float, wish: Floats | None = None
@@ -440,28 +446,31 @@ class Reaching:
         """Return the damped step nearest to a wish (N,), or to none; DOFs stop at their limits."""
         start, jacobian = state.values, state.jacobian
         lowest, highest = self._low - start, self._high - start
+        # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs,
+        # those whose rows of G^-1 J^T are not 0.
         known = np.zeros(len(start)) if wish is None else wish.copy()
-        free: Bools = np.ones(len(start), dtype=bool)
         damp = (damping * self._size) ** 2 * _IDENTITY[:3, :3]
         inverse = self._inverse
+        eased = jacobian.T.copy() if inverse is None else inverse @ jacobian.T
+        free: Bools = np.ones(len(start), dtype=bool)
         while True:
-            # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs.
-            part = jacobian * free
             left = error - jacobian @ known
-            eased = part.T if inverse is None else inverse @ part.T
-            step = known + eased @ np.linalg.solve(part @ eased + damp, left)
-            largest = float(np.abs(step * free).max())
-            if largest > _LARGEST_STEP:
-                step[free] *= _LARGEST_STEP / largest
+            step = known + eased @ np.linalg.solve(jacobian @ eased + damp, left)
+            if np.abs(step).max() > _LARGEST_STEP:
+                step[free] *= min(1.0, _LARGEST_STEP / float(np.abs(step[free]).max()))
             bounded = np.minimum(np.maximum(step, lowest), highest)
-            stopped = free & (np.abs(bounded - step) > _STILL)
-            if not stopped.any():
+            stopped = np.flatnonzero(np.abs(bounded - step) > _STILL)
+            if not len(stopped):
                 return bounded
+            for row in stopped:
+                # The inverse of the metric of the DOFs that are left, by their Schur complement.
+                if inverse is not None:
+                    column = inverse[:, row] / inverse[row, row]
+                    eased -= column[:, None] * eased[row]
+                    inverse = inverse - column[:, None] * inverse[row]
+                eased[row] = 0.0
             known[stopped] = bounded[stopped]
-            free &= ~stopped
-            if inverse is not None:  # that of the metric of the DOFs that are left
-                for row in np.flatnonzero(stopped):
-                    inverse = inverse - np.outer(inverse[:, row], inverse[row]) / inverse[row, row]
+            free[stopped] = False
 
     def _eased(self, state: _State, most: float, inverse: Floats) -> _State:
         """Return a state nearer to the start, and away from limits, if the joint stays in place.
@@ -487,7 +496,7 @@ class Reaching:
         """Return another state if it is nearer than one that is held, and whether it is settled."""
         # The search goes on in the next call, so that none takes long.
         least = self._left(state) - _RETRY * self._size
-        other, is_settled = self._nearest(other, _SEARCH_ROUNDS, _SLOW)
+        other, is_settled = self._nearest(other, _SEARCH_STEPS, _SLOW)
         is_nearer = self._left(other) < least
         self._other = None if is_nearer or is_settled or least <= 0.0 else other
         return (other, is_settled) if is_nearer else (state, True)
@@ -522,7 +531,7 @@ class Reaching:
                         break
                     if self._left(better) < distance * (1.0 - 1e-6):
                         return better
-                    better = self._improved(better)
+                    better, _ = self._improved(better, 0.0, _DRAG_STEPS)
         return None
 
 
