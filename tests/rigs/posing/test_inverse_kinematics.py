@@ -402,6 +402,32 @@ def test_new_drag_continues_in_the_pose_that_the_last_one_left():
     assert_allclose(again.dofs, found.dofs, atol=1e-12)
 
 
+def test_hand_that_circles_its_joint_adds_no_turns():
+    skeleton, angles = arm(), 0.4 + np.arange(0.0, 2.5 * np.pi, 0.1)
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0, 0.4
+    reaching = Reaching(skeleton, pose, 2, 1)
+    found = [reaching.follow(np.array([1 + np.cos(a), np.sin(a), 0])) for a in angles]
+    elbow = np.array([each.dofs[1] for each in found])
+    # The angle of the hand that is nearest to its angle at the start.
+    assert_allclose(elbow, 0.4 + np.arctan2(np.sin(angles - 0.4), np.cos(angles - 0.4)), atol=1e-4)
+
+
+def test_arm_past_gimbal_lock_keeps_the_angles_that_are_nearest_to_its_start():
+    # The hand circles in a plane through the second axis, so that the second DOF would pass 90
+    # degrees: near there, the outer ones turn by half a turn.
+    joints = np.array([[0.0, 0, 0], [1, 0, 0]])
+    skeleton = ball_skeleton(("shoulder", "hand"), np.array([-1, 0]), joints)
+    pose = rest_pose(skeleton)
+    reaching = Reaching(skeleton, pose, 1)
+    for angle in np.arange(0.0, 4.3 * np.pi, 0.05):
+        target = np.array([np.cos(angle), 0.02 * np.sin(angle), -np.sin(angle)])
+        found = reaching.follow(target)
+        assert np.abs(found.dofs).max() <= np.pi + 1e-9
+        pose.dofs[:] = found.dofs
+        assert_allclose(world_matrices(skeleton, pose)[1, :3, 3], target, atol=0.05)
+
+
 def test_loops_of_the_target_do_not_twist_the_arm():
     skeleton = hinged_arm(np.concatenate([FREE_SHOULDER, HINGE]))
     start = np.array([0.0, -0.3, 0.2, 0.0, -1.2, 0.0])

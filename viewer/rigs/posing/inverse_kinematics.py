@@ -31,7 +31,8 @@ from viewer.rigs.geometry.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import path_to_root
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.pose import Pose
+from viewer.rigs.pose import Pose, dof_rotations
+from viewer.rigs.posing.joint_rotation import nearest_dofs, rotation_dofs
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 _CLOSE = 1e-7  # error below which the target is reached, as a fraction of the chain's length
@@ -247,7 +248,7 @@ class Reaching:
             raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
         rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
         self._rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
-        start = pose.copy()
+        self._skeleton, self._start, start = skeleton, pose.copy(), pose.copy()
         self._dofs = start.dofs
         self._kinds = skeleton.dof_kinds[self._rows] - FIRST_ROTATION
         self._axes = np.eye(3)[self._kinds]
@@ -395,7 +396,26 @@ class Reaching:
         self._dofs[self._rows] = state.values
         at_limit = (state.values <= self._low) | (state.values >= self._high)
         distance = math.dist(self._target, state.place)
-        return Reach(self._dofs.copy(), distance, self._rows[at_limit], is_settled)
+        return Reach(self._unwound(), distance, self._rows[at_limit], is_settled)
+
+    def _unwound(self) -> Floats:
+        """Return DOFs (D,) of the same pose without full turns since the start.
+
+        Steps past gimbal lock, and a target that circles, add turns without limit. Keys of such
+        DOFs would spin the joint.
+        """
+        dofs, skeleton = self._dofs.copy(), self._skeleton
+        wound = self._rows[np.abs(dofs - self._start.dofs)[self._rows] > np.pi]
+        if not len(wound) or skeleton.posing is not None:
+            return dofs
+        rotations = dof_rotations(skeleton, dofs)
+        for joint in np.unique(skeleton.dof_joints[wound]).tolist():
+            rotation = quaternion_to_matrix(self._start.rotations[joint]) @ rotations[joint]
+            near = nearest_dofs(skeleton, self._start, joint, rotation)
+            if near.error < _APART:
+                rows = rotation_dofs(skeleton, joint)
+                dofs[rows] = near.dofs[rows]
+        return dofs
 
     def _left(self, state: _State) -> float:
         """Return the distance to the target that is solved for."""
