@@ -183,6 +183,25 @@ def test_options_of_captures_are_reported_for_other_files(tmp_path, settings, na
     assert unused(path, model=bundled_body(), **settings) == [f"F007.unused-{name}"]
 
 
+@pytest.mark.parametrize("suffix", ["obj", "ply"])
+def test_up_axis_and_unit_may_be_stated_for_meshes(tmp_path, suffix):
+    path = tmp_path / f"triangle.{suffix}"
+    triangle = viewer.figure(np.eye(3), [[0, 1, 2]], up="z", unit="m")
+    viewer.export(viewer.Actor(triangle), path)
+    for settings, expected in (
+        ({}, ("z", "m")),
+        ({"up": "y"}, ("y", "m")),
+        ({"unit": "cm"}, ("z", "cm")),
+        ({"up": "-y", "unit": "in"}, ("y", "in")),
+    ):
+        scene = load(path, motion=MotionSettings(**settings))
+        figure = scene[0].figure
+        assert (figure.up, figure.unit) == expected
+        told = [f"{path}: --up -y applies to motions only: y up"]
+        assert list(scene.warnings) == (told if settings.get("up") == "-y" else [])
+    assert unused(bundled_body(), up="z", unit="cm") == ["F007.unused-unit", "F007.unused-up"]
+
+
 def test_model_without_a_motion_is_reported():
     assert unused(bundled_body(), model=bundled_body()) == ["F007.unused-model"]
 

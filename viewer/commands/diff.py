@@ -97,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also open this file with every input, such as the .skel of .anim files",
     )
     add_settings(files, MotionSettings, "up")
-    add_settings(files, MotionSettings, "unit", help="length unit of BVH files")
+    add_settings(files, MotionSettings, "unit", help="length unit of BVH, OBJ and PLY files")
     add_settings(files, MotionSettings, "animation")
     group = parser.add_argument_group("poses")
     group.add_argument(

@@ -208,13 +208,18 @@ def polygon_text(counts: NDArray[np.integer], n_triangles: int) -> str:
     return f"{', '.join(parts)}: {counted(n_triangles, 'triangle')} in all"
 
 
-def stated_up(comment: str) -> Up:
-    """Return the up axis stated by a comment that this program wrote; y by default."""
-    return "z" if re.search(r"\bz up\b", comment) else "y"
+def axis_and_unit(source: Source, comment: str) -> tuple[Up, str]:
+    """Return the up axis and unit of a file: as requested, else as this program's comment states.
 
-
-def stated_unit(comment: str) -> str:
-    """Return the unit that a comment written by this program states; empty without one."""
+    Without either, they are y and unknown (empty).
+    """
+    asked = source.option("up")
+    if asked.startswith("-"):
+        source.warn(
+            "F007.up-sign: --up {up} applies to motions only: {used} up", up=asked, used=asked[1:]
+        )
+    is_z = asked.endswith("z") if asked else re.search(r"\bz up\b", comment) is not None
     stated = re.search(r"\b[yz] up, (\w+)", comment)
     names = {name: unit for unit, name in UNIT_NAMES.items()}
-    return "" if stated is None else names.get(stated[1], "")
+    unit = source.option("unit")
+    return "z" if is_z else "y", unit or ("" if stated is None else names.get(stated[1], ""))

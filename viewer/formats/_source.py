@@ -72,7 +72,8 @@ class Source:
 
     ``is_folder``: whether it is a folder, which has no bytes. ``max_size``: largest size of a file
     in bytes, including those inside a folder or archive. ``options``: options that select among the
-    contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of detail) for MHR. ``frame_faults``:
+    contents of a file, ``"rig"`` for Anny and ``"lod"`` (level of detail) for MHR, or state what
+    it does not, ``"up"`` and ``"unit"``. ``frame_faults``:
     the first error in frames of a motion that become gaps, see ``_frame_gaps.py``.
     """
 
@@ -151,7 +152,7 @@ class Source:
         return not self._is_stored
 
     def option(self, name: str) -> str:
-        """Return an option that selects among the contents of the file; empty for the default."""
+        """Return an option that the reader considers; empty for the default."""
         self.used_options.add(name)
         return self.options.get(name, "")
 

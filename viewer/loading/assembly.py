@@ -378,7 +378,13 @@ def _note_unused_options(contents: Contents, draft: SceneDraft, settings: Motion
     is_driving = any(builder.target is not None for builder in draft.builders)
     if is_driving or any(actor.drive is not None for actor in draft.actors):
         used.add("joint-map")
+    if contents.skeleton_motions:
+        used |= {"unit", "up"}
+    if contents.captures or contents.body_motions:
+        used.add("up")
     for name, value, why in (
+        ("unit", settings.unit, "no file is a BVH, OBJ or PLY"),
+        ("up", settings.up, "no file is a capture, BVH, OBJ or PLY"),
         ("rig", settings.rig, "only Anny has several rigs"),
         ("lod", settings.lod, "only MHR has levels of detail"),
         ("space", settings.space, "no file has results of video motion capture"),

@@ -325,7 +325,8 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
 def _reader_options(settings: MotionSettings) -> dict[str, str]:
     """Return the options that readers consider; see ``Source.options``."""
     rate = settings.frame_rate
-    return {"rig": settings.rig, "lod": settings.lod, "fps": "" if rate is None else f"{rate!r}"}
+    options = {"fps": "" if rate is None else f"{rate!r}"}
+    return options | {name: getattr(settings, name) for name in ("rig", "lod", "up", "unit")}
 
 
 def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:

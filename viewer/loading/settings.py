@@ -38,9 +38,13 @@ class MotionSettings:
     lod: str = setting("", "level of detail of MHR, 0 (fine) to 6 (coarse)", metavar="N")
     frame_rate: float | None = None
     """Frames per second; None for the file's own, or 30 if it has none."""
-    up: StatedUp = setting("", "up axis of captures and BVH files", choices=SIGNED_UPS)
+    up: StatedUp = setting("", "up axis of captures, BVH, OBJ and PLY files", choices=SIGNED_UPS)
     """Empty to detect it from the bodies."""
-    unit: str = setting("", "length unit of BVH files (default: estimated)", choices=METRES)
+    unit: str = setting(
+        "",
+        "length unit of BVH, OBJ and PLY files (default: estimated in BVH, else unknown)",
+        choices=METRES,
+    )
     """Lengths are converted from it to metres."""
     flat_hands: bool | None = None
     """Whether hand components are relative to the flat hand; None for the model's convention."""

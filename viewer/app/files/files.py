@@ -67,7 +67,7 @@ class Files:
     model_folder: Path | None = None
     """Folder of body models; read when the window "Preferences" opens."""
     up: StatedUp = ""
-    """Up axis of captures and BVH files that are opened; empty to detect it."""
+    """Up axis of captures, BVH, OBJ and PLY files that are opened; empty to detect it."""
     wake: Callable[[], None] = lambda: None
     """Called from other threads when a frame must be drawn."""
     keeps_recent: bool = False
@@ -115,6 +115,8 @@ class Loader(ThreadJob):
 
     def _read_one(self, paths: Sequence[Path]) -> None:
         contents = read_files(paths, settings=self._settings)
+        if contents.used_options is not None:
+            contents.used_options.add("up")  # a preference, which need not apply to every file
         self.paths = tuple(paths)
         if contents.is_addition:
             self.addition = contents

@@ -36,7 +36,7 @@ UPS: dict[StatedUp, str] = {
     "-y": "-y",
     "-z": "-z",
 }
-"""Up axes of captures and BVH files, with their labels."""
+"""Up axes of captures, BVH, OBJ and PLY files, with their labels."""
 
 
 @dataclass(slots=True)
@@ -55,7 +55,7 @@ class Preferences:
     samples: int = setting(4, choices=SAMPLES)
     """Samples per pixel."""
     up: StatedUp = setting("", choices=UPS)
-    """Up axis of captures and BVH files."""
+    """Up axis of captures, BVH, OBJ and PLY files."""
     keys: dict[str, str] = field(default_factory=dict)
     """Keys that differ from the default: maps names of actions to names of keys."""
 

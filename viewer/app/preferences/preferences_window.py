@@ -67,7 +67,7 @@ def draw_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
         explain("anti-aliasing; the driver may provide fewer")
         preferences.samples = int(chosen)
         imgui.separator_text("Files")
-        text = "up axis of captures and BVH files that are opened from now on"
+        text = "up axis of captures, BVH, OBJ and PLY files that are opened from now on"
         draw_setting(state, "Up axis", preferences, "up", text)
         folder = state.of(Files).model_folder
         begin_field("Model folder")

@@ -28,11 +28,10 @@ from viewer.data_classes import dataclass
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._polygons import (
     Picks,
+    axis_and_unit,
     filled_normals,
     picked,
     polygon_text,
-    stated_unit,
-    stated_up,
     triangulate,
 )
 from viewer.formats._source import Source
@@ -160,11 +159,12 @@ def read(source: Source) -> Figure:
         source.warn("F005.obj-texture: texture without vt lines: drawn untextured")
     head = source.peek(_HEAD).decode("ascii", "replace")
     comments = "\n".join(re.findall(r"^#.*$", head, re.MULTILINE))
+    up, unit = axis_and_unit(source, comments)
     return Figure(
         name=source.path.stem,
         mesh=mesh,
-        up=stated_up(comments),
-        unit=stated_unit(comments),
+        up=up,
+        unit=unit,
         facts=_facts(parts, mesh, has_normals=normals is not None),
     )
 

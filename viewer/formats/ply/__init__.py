@@ -23,12 +23,11 @@ from numpy.typing import NDArray
 from viewer.diagnostics import wording
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._polygons import (
+    axis_and_unit,
     filled_normals,
     first_known,
     picked,
     polygon_text,
-    stated_unit,
-    stated_up,
     triangles_of,
     triangulate,
 )
@@ -82,7 +81,7 @@ def read(source: Source) -> Figure:
         source.warn(
             "F007.ply-no-faces: no faces: {n}, not drawn", n=counted(mesh.n_vertices, "point")
         )
-    comments = "\n".join(text for text, _ in header.comments)
+    up, unit = axis_and_unit(source, "\n".join(text for text, _ in header.comments))
     facts = []
     if (counts > 3).any():
         facts.append(("polygons", polygon_text(counts, mesh.n_triangles)))
@@ -91,8 +90,8 @@ def read(source: Source) -> Figure:
     return Figure(
         name=source.path.stem,
         mesh=mesh,
-        up=stated_up(comments),
-        unit=stated_unit(comments),
+        up=up,
+        unit=unit,
         facts=tuple(facts),
     )
 
