@@ -10,12 +10,12 @@ of long arms stay above the ground if those of the source do.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import chain, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
@@ -36,7 +36,7 @@ from viewer.rigs.feet.soles import Soles, soles_of_feet
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.samples import sample_surface
-from viewer.rigs.geometry.vectors import axis_vector, unit
+from viewer.rigs.geometry.vectors import axis_vector, lengths_of, unit
 from viewer.rigs.hierarchy import descendants
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.mesh import area_vectors
@@ -74,6 +74,7 @@ _SLACK = 0.025
 # The length s of the smooth curve of a hand's shift, seconds; as for feet, see ``planting``.
 _EASE = 0.15
 _EXTENDED = 0.97  # maximum extension of an arm: its elbow is bent by 28 degrees
+_ALMOST = 1.0 - 1e-6
 _SHORT = 0.005  # smallest miss of straight arms that is reported: a fifth of _SLACK
 # Height of the crown above the head's joint where nothing shows it: 0.11 to 0.2 for people, of whom
 # most files have the joint at the ears, some at the chin.
@@ -132,6 +133,8 @@ _SOLID = 0.25
 # by less than the first are closed, by more than the second are between other parts.
 _ROUNDS, _FAST, _PULL = 12, 0.12, (0.06, 0.12)
 _PLACED = 30.0  # frames per second in which hands are placed
+_BATCH = 64  # rows that are computed at once
+_NOWHERE = 1e3  # coordinates of no point, relative to the height
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,6 +342,7 @@ def _fingertips(skeleton: Skeleton, joints: dict[str, int]) -> list[int]:
     return result
 
 
+_Singles = NDArray[np.float32]
 _Capsule = tuple[Floats, Floats, float, float]
 
 
@@ -621,7 +625,7 @@ class _SkinPoints:
     """Points spread evenly over the skin of a body, each of which moves with one joint."""
 
     joints: Ints
-    """(P,) int32. The joints of the skeleton."""
+    """(P,) int32, ascending. The joints of the skeleton."""
     places: Floats
     normals: Floats
     """(P, 3). Positions, and outward normals, in the space of the joints."""
@@ -676,7 +680,8 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
         hands[is_hand & (np.linalg.norm(points - rest[wrist], axis=1) < reach)] = number
     if not {0, 1} <= set(hands.tolist()):
         return None
-    kept = np.flatnonzero((hands >= 0) | _is_solid(points, normals, area / _POINTS))
+    kept = np.flatnonzero((hands >= 0) | _encloses(points, normals, area / _POINTS, points))
+    kept = kept[np.argsort(movers[kept], kind="stable")]
     movers, arms, hands, parts = movers[kept], arms[kept], hands[kept], parts[kept]
     points, normals = points[kept], normals[kept]
     crown = None
@@ -706,24 +711,27 @@ def _points_of(figure: Figure, joints: dict[str, int]) -> _SkinPoints | None:
     )  # fmt: skip
 
 
-def _is_solid(points: Floats, normals: Floats, area: float) -> Bools:
-    """Return which points (P, 3) of a skin, each with an area, have an inside behind them: (P,).
+def _encloses(
+    skin: Floats | _Singles, normals: Floats | _Singles, area: float, points: Floats
+) -> Bools:
+    """Return which points (..., P, 3) are inside a skin with an area at each of (..., S, 3): (P,).
 
     The winding number (Barill et al. 2018) sums the solid angles of all pieces of the skin, as
     fractions of the sphere: 1 inside, 0 outside. It is 1/2 at a point of a closed skin, or of one
     with small openings, but 0 at one of an open sheet, such as a cape.
     """
     # Single precision, around the middle, takes half the time.
-    points = (points - points.mean(axis=0)).astype(np.float32)
-    normals = normals.astype(np.float32)
-    squares = (points**2).sum(axis=1)
-    distances = np.maximum(squares[:, None] + squares - 2.0 * points @ points.T, 0.0)
+    middle = points.mean(axis=-2, keepdims=True)
+    ends, starts, outward = (
+        np.asarray(each, dtype=np.float32) for each in (points - middle, skin - middle, normals)
+    )
+    squares = (ends**2).sum(axis=-1)[..., None] + (starts**2).sum(axis=-1)[..., None, :]
     # Pieces have a width, so that those next to a point subtend less than a small one would.
-    distances += area
-    heights = (points * normals).sum(axis=1) - points @ normals.T
-    angles = (heights / (distances * np.sqrt(distances))).sum(axis=1)
-    is_solid: Bools = area / (4.0 * np.pi) * angles > _SOLID
-    return is_solid
+    squares = np.maximum(squares - 2.0 * ends @ starts.swapaxes(-1, -2), 0.0) + area
+    heights = (starts * outward).sum(axis=-1)[..., None, :] - ends @ outward.swapaxes(-1, -2)
+    angles = (heights / (squares * np.sqrt(squares))).sum(axis=-1)
+    is_inside: Bools = area / (4.0 * np.pi) * angles > _SOLID
+    return is_inside
 
 
 class _Solid:
@@ -735,60 +743,88 @@ class _Solid:
         self.place = body.chains.place[points.joints]
         every = [np.flatnonzero(points.hands == number) for number in range(len(_ARMS))]
         self.hands = [
-            rows[_spread(points.places[rows], _HAND_POINTS)].astype(np.int32) for rows in every
+            np.sort(rows[_spread(points.places[rows], _HAND_POINTS)]).astype(np.int32)
+            for rows in every
         ]
         self.regions = {
             name: np.flatnonzero(each)[::2].astype(np.int32)
             for name, each in points.regions.items()
         }
 
-    def posed(self, row: int, rows: Ints) -> tuple[Floats, Floats]:
-        """Return the positions and normals of some points in a row."""
-        world = self.body.world[row, self.place[rows], :3]
-        points = np.einsum("pab,pb->pa", world[..., :3], self.points.places[rows]) + world[..., 3]
-        normals = np.einsum("pab,pb->pa", world[..., :3], self.points.normals[rows])
-        return points / self.body.height, unit(normals)
+    def posed(self, rows: Ints, points: Ints) -> tuple[Floats, Floats]:
+        """Return the positions and normals (R, P, 3) of some points (P,) in some rows."""
+        worlds, joints = self.body.world[rows], self.place[points]
+        placed, normals = np.empty((2, len(rows), len(points), 3))
+        # Multiplying by joints takes a quarter of the time of multiplying by points.
+        starts = np.flatnonzero(np.diff(joints, prepend=-1))
+        for start, stop in pairwise([*starts, len(points)]):
+            linear, offset = np.split(worlds[:, joints[start], :3] / self.body.height, [3], axis=2)
+            own = points[start:stop]
+            np.matmul(self.points.places[own], linear.swapaxes(1, 2), out=placed[:, start:stop])
+            placed[:, start:stop] += offset.swapaxes(1, 2)
+            turns = unscaled(linear).swapaxes(1, 2)
+            np.matmul(self.points.normals[own], turns, out=normals[:, start:stop])
+        return placed, normals
 
-    def around(
-        self, row: int, number: int, shift: Floats, arms: _Arms
-    ) -> tuple[Floats, Ints, Floats, Floats]:
-        """Return a hand's points, and the parts, positions and normals of the skin near it.
-
-        Only those of the other arm move with ``arms``.
-        """
-        own = self.posed(row, self.hands[number])[0]
+    def near(self, number: int, rows: Ints, shifts: Floats, arms: _Arms) -> Iterator[_NearSkin]:
+        """Yield batches of rows of a hand that is moved by shifts (N, 3), with the skin near it."""
         others = np.flatnonzero(self.points.arms != number).astype(np.int32)
-        points, normals = self.posed(row, others)
-        parts = self.points.parts[others]
-        moved, _ = arms.moved(1 - number, row, parts, points, normals)
-        centre = own.mean(axis=0) + shift
-        reach = np.linalg.norm(own + shift - centre, axis=1).max() + _DEEP
-        is_near = ((moved - centre) ** 2).sum(axis=1) < reach**2
-        return own, parts[is_near], points[is_near], normals[is_near]
-
-    def encloses(self, row: int, number: int, points: Floats) -> Bools:
-        """Return whether points (H, 3) are inside the skin without an arm in a row: (H,)."""
-        others = np.flatnonzero(self.points.arms != number)[::_FEWER].astype(np.int32)
-        places, normals = self.posed(row, others)
-        area = _FEWER * self.area
-        ways = places - points[:, None]
-        squares = (ways**2).sum(axis=2) + area
-        angles = np.einsum("hpa,pa->hp", ways, normals) / (squares * np.sqrt(squares))
-        is_inside: Bools = area / (4.0 * np.pi) * angles.sum(axis=1) > _SOLID
-        return is_inside
+        for batch in _batches(rows):
+            own = self.posed(batch, self.hands[number])[0]
+            points, normals = self.posed(batch, others)
+            parts = np.broadcast_to(self.points.parts[others], points.shape[:2])
+            moved, _ = arms.moved(1 - number, batch, parts, points, normals)
+            ends = own + shifts[batch, None]
+            centres = ends.mean(axis=1, keepdims=True)
+            reach = lengths_of(ends - centres).max(axis=1, keepdims=True) + _DEEP
+            is_near = lengths_of(moved - centres) < reach
+            holds, each = np.flatnonzero(is_near.any(axis=1)), np.arange(len(own))[:, None]
+            if not len(holds):
+                continue
+            # Those that are near come first.
+            order = np.argsort(~is_near, axis=1, kind="stable")[:, : is_near.sum(axis=1).max()]
+            near = np.where(is_near[each, order][..., None], points[each, order], _NOWHERE)
+            whole = np.stack([points, normals])[:, :, ::_FEWER].astype(np.float32)
+            yield _NearSkin(
+                number, batch[holds], own[holds], parts[each, order][holds], near[holds],
+                normals[each, order][holds], whole[:, holds],
+            )  # fmt: skip
 
     def radii(self, region: str, starts: Floats, ways: Floats, needed: Bools) -> Floats:
         """Return how far a blunt hand that comes along rays stops from their starts: (N,)."""
-        result = np.full(len(starts), np.nan)
-        rows = self.regions[region]
-        for row in np.flatnonzero(needed).tolist() if len(rows) else ():
-            away = self.posed(row, rows)[0] - starts[row]
-            along = away @ ways[row]
-            aside = (away**2).sum(axis=1) - along**2
+        result, rows = np.full(len(starts), np.nan), np.flatnonzero(needed).astype(np.int32)
+        for chosen in _batches(rows if len(self.regions[region]) else rows[:0]):
+            away = self.posed(chosen, self.regions[region])[0] - starts[chosen, None]
+            along = np.einsum("rpa,ra->rp", away, ways[chosen])
+            aside = np.einsum("rpa,rpa->rp", away, away) - along**2
             is_ahead = (along > 0.0) & (aside < (2.0 * _BLUNT) ** 2)
-            if is_ahead.any():
-                result[row] = (along - aside / (2.0 * _BLUNT))[is_ahead].max()
+            farthest = np.where(is_ahead, along - aside / (2.0 * _BLUNT), -np.inf).max(axis=1)
+            result[chosen] = np.where(np.isfinite(farthest), farthest, np.nan)
         return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _NearSkin:
+    """A hand and the skin near it in some rows, where they are without changes of the arms."""
+
+    number: int
+    """0 or 1, as of ``_ARMS``."""
+    rows: Ints
+    """(R,). Rows of the motion."""
+    own: Floats
+    """(R, H, 3). Points of the hand."""
+    parts: Ints
+    """(R, P). Parts of the points of the skin, as in ``_SkinPoints``."""
+    points: Floats
+    normals: Floats
+    """(R, P, 3). Rows with fewer points have some that are far from everything."""
+    whole: _Singles
+    """(2, R, S, 3). Points and normals of the skin without the hand's arm, in single precision."""
+
+
+def _batches(rows: Ints) -> list[Ints]:
+    """Return rows in pieces whose arrays fit into the cache."""
+    return [rows[start : start + _BATCH] for start in range(0, len(rows), _BATCH)]
 
 
 def _at_skin(
@@ -843,37 +879,30 @@ def _to_skin(
     result = _faded(body, targets, pulls, timing)
     # Hands that are in the body of the source may be as deep in the figure's.
     gaps = person.hand - np.clip(person.hand, -_UNSURE, _UNSURE)
-    rows = np.flatnonzero(touches.any(axis=0)).astype(np.int32)
-    arms = _Arms(body, rows)
-    cases = [(int(row), int(n)) for row in rows for n in np.flatnonzero(touches[:, row])]
-    arms.bend(result[:, rows])
-    near = {case: solid.around(*case, result[case[1], case[0]], arms) for case in cases}
-    for _ in range(_ROUNDS if cases else 0):
-        arms.bend(result[:, rows])
+    arms = _Arms(body, np.flatnonzero(touches.any(axis=0)).astype(np.int32))
+    arms.bend(result)
+    near = [
+        skin
+        for number, touching in enumerate(touches)
+        for skin in solid.near(
+            number, np.flatnonzero(touching).astype(np.int32), result[number], arms
+        )
+    ]
+    for _ in range(_ROUNDS if near else 0):
         farthest = 0.0
-        for case in cases:
-            row, number = case
-            own, parts, points, normals = near[case]
-            if not len(parts):
-                continue
-            points, normals = arms.moved(1 - number, row, parts, points, normals)
-            # Of two hands, each gives way by half.
-            give = np.where(parts == 2, 0.5, 1.0)
-            ways = np.where((parts < 0)[:, None], sides[number, row], 0.0)
-            own = own + result[number, row]
-            step = _step(
-                own, points, normals, partial(solid.encloses, *case), give, gaps[number, row], ways
-            )
-            step = arms.within_reach(number, row, step)
-            if (length := float(np.linalg.norm(step))) > _NONE:
-                # The next curve starts from this one, so that steps which it smooths do not add up.
-                part = touches[number, row]
-                targets[number, row] *= 1.0 - part
-                targets[number, row] += part * (result[number, row] + step)
-                farthest = max(farthest, part * length)
+        for skin in near:
+            number, rows = skin.number, skin.rows
+            step = _steps(skin, result, arms, _FEWER * solid.area, gaps, sides)
+            length = lengths_of(step)
+            # The next curve starts from this one, so that steps which it smooths do not add up.
+            part = np.where(length > _NONE, touches[number, rows], 0.0)
+            wished = part[:, None] * (result[number, rows] + step)
+            targets[number, rows] = (1.0 - part)[:, None] * targets[number, rows] + wished
+            farthest = max(farthest, float((part * length).max()))
         if farthest < _NONE:
             break
         result = _faded(body, targets, pulls, timing)
+        arms.bend(result)
     return result
 
 
@@ -906,7 +935,7 @@ class _Arms:
     """Arms of a body in some rows of its motion, as their wrists move."""
 
     def __init__(self, body: _Body, rows: Ints) -> None:
-        self.index = {int(row): index for index, row in enumerate(rows)}
+        self.rows = rows
         self.joints = [
             (body.at(shoulder)[rows], body.at(elbow)[rows], body.at(wrist)[rows])
             for shoulder, elbow, wrist in _ARMS
@@ -918,79 +947,95 @@ class _Arms:
         ]
 
     def bend(self, shifts: Floats) -> None:
-        """Move the wrists by shifts (2, R, 3)."""
-        self.shifts = shifts
-        self.turns = [
-            [quaternion_to_matrix(turn) for turn in bend(*points, points[2] + shift, axis)]
-            for points, shift, axis in zip(self.joints, shifts, self.axes, strict=True)
-        ]
+        """Move the wrists by shifts (2, N, 3), of which those in the rows count."""
+        self.shifts = shifts[:, self.rows]
+        # Of each part of an arm, and of all others in the end: x' = A x + b.
+        self.linear = np.tile(np.eye(3), (len(_ARMS), len(self.rows), 4, 1, 1))
+        self.offsets = np.zeros((len(_ARMS), len(self.rows), 4, 3))
+        for arm, (points, shift) in enumerate(zip(self.joints, self.shifts, strict=True)):
+            shoulder, elbow, wrist = points
+            turns = bend(*points, wrist + shift, self.axes[arm])
+            upper, lower = (quaternion_to_matrix(turn) for turn in turns)
+            bent = shoulder + np.einsum("rab,rb->ra", upper, elbow - shoulder)
+            self.linear[arm, :, :2] = np.stack([upper, lower], axis=1)
+            self.offsets[arm, :, 0] = shoulder - np.einsum("rab,rb->ra", upper, shoulder)
+            self.offsets[arm, :, 1] = bent - np.einsum("rab,rb->ra", lower, elbow)
+            self.offsets[arm, :, 2] = shift
 
     def moved(
-        self, arm: int, row: int, parts: Ints, points: Floats, normals: Floats
+        self, arm: int, rows: Ints, parts: Ints, points: Floats, normals: Floats
     ) -> tuple[Floats, Floats]:
-        """Return points and normals (P, 3) of the skin, of which some parts are of a bent arm."""
+        """Return points and normals (R, P, 3) of the skin, of which some parts (R, P) are an arm's.
+
+        All are where they are without changes of the arms.
+        """
         if (parts < 0).all():
             return points, normals
-        index = self.index[row]
-        shoulder, elbow, _ = (each[index] for each in self.joints[arm])
-        upper, lower = (turn[index] for turn in self.turns[arm])
-        points, normals = points.copy(), normals.copy()
-        bent = shoulder + upper @ (elbow - shoulder)
-        for part, turn, before, after in ((0, upper, shoulder, shoulder), (1, lower, elbow, bent)):
-            own = parts == part
-            points[own] = after + (points[own] - before) @ turn.T
-            normals[own] = normals[own] @ turn.T
-        points[parts == 2] += self.shifts[arm, index]
-        return points, normals
+        index = np.searchsorted(self.rows, rows)[:, None]
+        linear, offsets = self.linear[arm, index, parts], self.offsets[arm, index, parts]
+        return (
+            np.einsum("rpab,rpb->rpa", linear, points) + offsets,
+            np.einsum("rpab,rpb->rpa", linear, normals),
+        )
 
-    def within_reach(self, arm: int, row: int, step: Floats) -> Floats:
-        """Return the step of a wrist: the arm can only swing about the shoulder at full length."""
-        index = self.index[row]
+    def within_reach(self, arm: int, rows: Ints, steps: Floats) -> Floats:
+        """Return steps (R, 3) of a wrist: straight arms can only swing about the shoulder."""
+        index = np.searchsorted(self.rows, rows)
         shoulder, elbow, wrist = (each[index] for each in self.joints[arm])
-        longest = _EXTENDED * (np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))
+        # The curve leaves arms exactly as long as this, but for rounding.
+        longest = _ALMOST * _EXTENDED * (lengths_of(elbow - shoulder) + lengths_of(wrist - elbow))
         line = wrist + self.shifts[arm, index] - shoulder
-        outward = unit(line) @ step
-        if outward <= 0.0 or np.linalg.norm(line) < longest:
-            return step
+        outward = np.einsum("ra,ra->r", unit(line), steps)
         # Along the tangent t, the way s out of the skin takes s^2 / t.
-        swing = step - outward * unit(line)
-        length, wished = float(np.linalg.norm(swing)), float(np.linalg.norm(step))
-        result: Floats = min(wished**2 / max(length, 1e-30), _FAST) * unit(swing)
-        return result
+        swing = steps - outward[:, None] * unit(line)
+        length = np.einsum("ra,ra->r", steps, steps) / np.maximum(lengths_of(swing), 1e-30)
+        is_straight = (outward > 0.0) & (lengths_of(line) >= longest)
+        swing = np.minimum(length, _FAST)[:, None] * unit(swing)
+        return np.where(is_straight[:, None], swing, steps)
 
 
-def _step(
-    points: Floats, others: Floats, normals: Floats, encloses: Callable[[Floats], Bools],
-    give: Floats, gap: float, ways: Floats,
-) -> Floats:  # fmt: skip
-    """Return a translation (3,) of points (H, 3) to a gap from the skin at other points (P, 3)."""
-    nearest = ((others**2).sum(axis=1) - 2.0 * points @ others.T).argmin(axis=1)
-    away, outward = points - others[nearest], normals[nearest]
-    heights = np.einsum("ha,ha->h", away, outward)
-    distances = np.linalg.norm(away, axis=1)
+def _steps(
+    skin: _NearSkin, shifts: Floats, arms: _Arms, area: float, gaps: Floats, sides: Floats
+) -> Floats:
+    """Return translations (R, 3) of a hand to its gaps from the skin near it.
+
+    ``area``: of the pieces of the whole skin.
+    """
+    number, rows, parts = skin.number, skin.rows, skin.parts
+    own, each = skin.own + shifts[number, rows, None], np.arange(len(rows))[:, None]
+    others, normals = arms.moved(1 - number, rows, parts, skin.points, skin.normals)
+    squares = np.einsum("rpa,rpa->rp", others, others)[:, None]
+    nearest = (squares - 2.0 * own @ others.swapaxes(1, 2)).argmin(axis=2)
+    away, outward = own - others[each, nearest], normals[each, nearest]
+    heights = np.einsum("rha,rha->rh", away, outward)
+    distances = lengths_of(away)
     aside = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
     is_inside = heights < -_BEHIND * distances
     # Behind the inner face of a piece of armour is no inside.
-    deep = np.flatnonzero(is_inside & (heights < -_UNSURE))
-    if len(deep):
-        is_inside[deep] = encloses(points[deep])
+    deep = is_inside & (heights < -_UNSURE)
+    unsure = np.flatnonzero(deep.any(axis=1))
+    if len(unsure):
+        whole, normals_there = skin.whole[:, unsure]
+        is_enclosed = _encloses(whole, normals_there, area, own[unsure])
+        is_inside[unsure] &= ~deep[unsure] | is_enclosed
     # Points of the skin are discs as wide as the distances between them.
     clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - _DISC, 0.0)))
-    first = int(clear.argmin())
-    missing = np.maximum(gap - clear, 0.0)
-    if missing[first] <= 0.0:
-        # What is farther is another part than the source's hand touches.
-        excess = clear[first] - gap
-        near = float(falling(np.array((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))))
-        return -near * excess * give[nearest[first]] * unit(away[first])
+    each, first = each[:, 0], clear.argmin(axis=1)
+    missing = np.maximum(gaps[number, rows, None] - clear, 0.0)
+    # What is farther is another part than the source's hand touches.
+    excess = clear[each, first] - gaps[number, rows]
+    near = falling((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))
+    pull = -(near * excess)[:, None] * unit(away[each, first])
     # The mean direction out, on the side of the part on which the hand is.
-    out = (
-        outward
-        - np.minimum(np.einsum("ha,ha->h", outward, ways[nearest]), 0.0)[:, None] * ways[nearest]
-    )
-    way = unit(missing @ out)
-    cosine = max(float(way @ outward[first]), 0.5)
-    return min(missing[first] / cosine, _FAST) * give[nearest[first]] * way
+    ways = np.where((parts[each[:, None], nearest] < 0)[..., None], sides[number, rows, None], 0.0)
+    inwards = np.minimum(np.einsum("rha,rha->rh", outward, ways), 0.0)
+    way = unit(np.einsum("rh,rha->ra", missing, outward - inwards[..., None] * ways))
+    cosine = np.maximum(np.einsum("ra,ra->r", way, outward[each, first]), 0.5)
+    push = np.minimum(missing[each, first] / cosine, _FAST)[:, None] * way
+    # Of two hands, each gives way by half.
+    give = np.where(parts[each, nearest[each, first]] == 2, 0.5, 1.0)
+    step = give[:, None] * np.where((missing[each, first] > 0.0)[:, None], push, pull)
+    return arms.within_reach(number, rows, step)
 
 
 def _spread(points: Floats, count: int) -> Ints:
