@@ -76,8 +76,11 @@ def pop_for_six(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> Non
     bends[30:36] += 20.0
 
 
-def pop_at_the_end(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
-    bends[FRAMES - 3] += 50.0
+def pop_at(frame: int) -> Change:
+    def change(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
+        bends[frame] += 50.0
+
+    return change
 
 
 def pop_in_a_twist(bends: np.ndarray, moves: np.ndarray, scales: np.ndarray) -> None:
@@ -135,7 +138,9 @@ FAULTS = {
     "pop of 15 degrees": (pop(-15.0), "C020.rotation", [3], {"size": "15°"}, [30]),
     "pop of two frames": (pop_for_two, "C020.rotation", [3], {"size": "50°"}, [30, 31]),
     "pop of six frames": (pop_for_six, "C020.rotation", [3], {"size": "20°"}, [*range(30, 36)]),
-    "pop at the end": (pop_at_the_end, "C020.rotation", [3], {"size": "50°"}, [57]),
+    "pop at the end": (pop_at(57), "C020.rotation", [3], {"size": "50°"}, [57]),
+    "pop of the last frame but one": (pop_at(58), "C020.rotation", [3], {}, [58]),
+    "pop of the second frame": (pop_at(1), "C020.rotation", [3], {}, [1]),
     "pop of a fast joint": (pop_in_a_twist, "C020.rotation", [3], {"size": "24°"}, [30]),
     "pop of a quick limb": (pop_of_a_quick_limb(1), "C020.rotation", [3], {}, [30]),
     "pop of a quick limb for two frames": (
@@ -170,19 +175,22 @@ def test_fault_is_found_at_its_joint_and_frames(name, is_captured):
     assert frames is None or sorted(one.frames.tolist()) == frames
 
 
+@pytest.mark.parametrize(("first", "size"), [(30, 25), (1, 27), (FRAMES - 1, 27)])
 @pytest.mark.parametrize(("steps", "codes"), [((0, 0), ["C020.turn"]), ((12, 0), [])])
-def test_joint_that_turns_within_a_frame_is_found_unless_others_do(steps, codes):
-    """The elbow is 25 degrees off from frame 30 on, while spine, shoulder and wrist move."""
+def test_joint_that_turns_within_a_frame_is_found_unless_others_do(steps, codes, first, size):
+    """The elbow is 25 degrees off from a frame on, while spine, shoulder and wrist move."""
+    # Beyond the ends, the pose is held: second differences are (25 + 3.14, -25) degrees, as the
+    # elbow moves by 3.14 a frame there; their projection onto the pattern (1, -1) is 26.6.
     turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
-    later = 1.0 * (K >= 30)
+    later = 1.0 * (first <= K)
     for joint, by in ((1, steps[0]), (2, steps[1]), (3, 25.0), (4, 0.0)):
         turns[:, joint] = about_z(waving() + by * later)
     clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 6, 3)))
     found = [*pops.check(Subject(Actor(arm(), clip=clip)))]
     assert [one.diagnostic.key for one in found] == codes
     for one in found:
-        assert one.joints.tolist() == [3] and one.frames.tolist() == [30]
-        assert "rotates by 25° within frame 30" in one.message
+        assert one.joints.tolist() == [3] and one.frames.tolist() == [first]
+        assert f"rotates by {size}° within frame {first}" in one.message
 
 
 @pytest.mark.parametrize(("name", "n_found"), [("left_eye", 0), ("eyelid_l", 0), ("left_ear", 1)])

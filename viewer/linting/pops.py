@@ -35,6 +35,9 @@ _SHORT = 0.1  # length of such steps, relative to a
 # their edges are at least 0.38 times as large. Keys that were shifted move one joint.
 _ALONE = 0.25  # maximum edge of another joint in the same frame, relative to a
 _GO_ON, _MOVES = 3, 1e-3  # minimum number of others that move meanwhile, by more than this angle
+# The first and the last pose are held for the longest difference beyond the motion, so that the
+# frames there are seen, too: one that leaves the path there is a step between a hold and the rest.
+_HELD = 4
 _NEAR = 4  # number of steps before and after
 _AROUND = 8  # differences before and after that are compared
 _SEEN = 2  # minimum number of frames before and after
@@ -184,6 +187,8 @@ def _found(
     values: Floats, known: Bools, shapes: tuple[_Shape, ...], least: float
 ) -> OffPath | None:
     """Return what has one of the shapes in values (F, N, C), and exceeds a size."""
+    values = np.pad(values, ((_HELD, _HELD), (0, 0), (0, 0)), mode="edge")
+    known = np.pad(known, ((_HELD, _HELD), (0, 0)), mode="edge")
     orders = sorted({1, *(shape.order for shape in shapes)})
     differences = {order: np.diff(values, n=order, axis=0) for order in orders}
     ends = ((_AROUND + 1, _AROUND + _LONGEST), (0, 0))
@@ -196,7 +201,7 @@ def _found(
         return None
     order = np.argsort(-size, kind="stable")
     frames = [
-        np.arange(first, first + max(shape.n_frames, 1))
+        np.arange(first, first + max(shape.n_frames, 1)) - _HELD
         for shape, (_, firsts, _) in zip(shapes, each, strict=True)
         for first in firsts.tolist()
     ]
@@ -270,9 +275,10 @@ def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
     if found is None:
         return None
     # Half a third difference is the edge of a step: x = 0 0 1 1 has -2 = 1 - 3.
-    edges = 0.5 * lengths_of(np.diff(values, n=3, axis=0))
+    held = np.pad(values, ((_HELD, _HELD), (0, 0), (0, 0)), mode="edge")
+    edges = 0.5 * lengths_of(np.diff(held, n=3, axis=0))
     firsts = np.array([int(frames[0]) for frames in found.frames])
-    others = edges[firsts - 2]
+    others = edges[firsts + _HELD - 2]
     others[np.arange(len(firsts)), found.columns] = 0.0
     moving = lengths_of(np.diff(values, axis=0))[firsts - 1] > _MOVES
     go_on = moving.sum(axis=1) - 1 >= _GO_ON
