@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,10 @@ import viewer.commands.view
 from viewer.cli import run
 from viewer.commands import COMMANDS
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits", "_no_display")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("quick_fits", "_coarse_voxels", "_no_display"),
+]
 
 NOT_RUN = {
     "make": "sets up the checkout, or runs these tests",
@@ -79,6 +83,12 @@ def _no_display(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer.commands.view, "SIZE", (64, 36))
 
 
+@pytest.fixture
+def _coarse_voxels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Find skeletons with 96 voxels along the longest side instead of 160: much faster."""
+    monkeypatch.setattr("viewer.autorig.curve_skeleton._FINEST", 96)
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("files")
@@ -132,6 +142,7 @@ def test_python_examples_run_as_printed(path, files, tmp_path, monkeypatch):
         if source is None:
             (folder / name).unlink()
     monkeypatch.setattr("viewer.show", shown_without_display)
+    monkeypatch.setattr("viewer.rig", partial(viewer.rig, method="nearest"))
     monkeypatch.setenv("VIEWER_CONNECTION_FILE", str(tmp_path / "window.json"))
     is_live = any("viewer.connect" in example for example in examples)
     names: dict[str, object] = {}
