@@ -44,6 +44,23 @@ def test_quarter_turn_moves_the_second_joint_by_the_root_of_two():
     assert errors.pve == pytest.approx(1000.0 * math.sqrt(2.0) * 2.0 / 3.0)
 
 
+def test_joints_of_another_order_correspond_by_name():
+    places = np.array([[0, 0, 0], [0, 1, 0], [0, -1, 0]], float)
+    figures = [
+        viewer.figure(
+            [[0, 0, 0]],
+            np.zeros((0, 3), int),
+            joints=places[order],
+            parents=[-1, 0, 0],
+            names=[("hip", "up", "down")[joint] for joint in order],
+            unit="m",
+        )
+        for order in ([0, 1, 2], [0, 2, 1])
+    ]
+    first, second = (viewer.animate(each, np.zeros((3, 3, 3)), fps=10.0) for each in figures)
+    assert pose_errors(second, first).mpjpe < 1e-9
+
+
 def test_acceleration_is_that_of_a_thrown_body():
     times = np.arange(5) / 10.0
     fallen = np.stack([0.0 * times, -0.5 * 9.81 * times**2, 0.0 * times], axis=1)

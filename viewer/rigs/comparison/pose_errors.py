@@ -20,7 +20,8 @@ import numpy as np
 from viewer.arguments import check_type
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rigs.arrays import Bools, Floats, runs_of
+from viewer.rigs.arrays import Bools, Floats, Ints, runs_of
+from viewer.rigs.comparison.pairs import pair_joints
 from viewer.rigs.feet.body import body_legs
 from viewer.rigs.feet.contacts import foot_contacts
 from viewer.rigs.feet.legs import legs_of
@@ -63,7 +64,8 @@ def pose_errors(
     found
         The estimated motion, or a pose.
     reference
-        The true one: as many joints and frames, at the same rate. Joints correspond by index.
+        The true one: as many joints and frames, at the same rate. Joints correspond by name if
+        both have the same names, in whatever order, else by index.
     frames : (int, int), optional
         First frame and the frame after the last one, counted from 0; all by default.
 
@@ -86,6 +88,7 @@ def pose_errors(
                 f"{found.name}: expected {theirs.shape[axis]} {what} as in {reference.name}, "
                 f"found {ours.shape[axis]}"
             )
+    ours = ours[:, _order(found, reference)]
     rates = [_rate(actor) for actor in (found, reference)]
     if rates[0] != rates[1]:
         raise RigError(f"{found.name}: expected {rates[1]:g} frames per second, found {rates[0]:g}")
@@ -113,6 +116,13 @@ def pose_errors(
         foot_skate=skate,
         n_frames=int(seen.sum()),
     )
+
+
+def _order(found: Actor, reference: Actor) -> Ints | slice:
+    """Return the joints of an actor in the order of another's; as they are if names differ."""
+    pairs = pair_joints(reference.figure.require_skeleton(), found.figure.require_skeleton())
+    has_all = len(pairs.second) == found.figure.require_skeleton().n_joints
+    return pairs.second if has_all else slice(None)
 
 
 def _foot_skate(ours: Floats, reference: Actor, rate: float, chosen: slice) -> float:
