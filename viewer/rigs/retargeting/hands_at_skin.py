@@ -1,0 +1,303 @@
+"""Hands of a driven figure, moved until their gaps from its skin are those of the source's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.rigs.arrays import Floats, Ints
+from viewer.rigs.feet.body import spans_of
+from viewer.rigs.feet.curves import falling, smooth_curves
+from viewer.rigs.feet.legs import bend, hinges, unscaled
+from viewer.rigs.geometry.rotation import quaternion_to_matrix
+from viewer.rigs.geometry.vectors import lengths_of, unit
+from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.body_parts import (
+    ARMS,
+    EXTENDED,
+    PARTS,
+    Body,
+    bones,
+    from_bone,
+    region_of,
+    together_in,
+    within_reach,
+)
+from viewer.rigs.retargeting.figure_skin import Singles, Solid, batches, encloses
+from viewer.rigs.retargeting.person_skin import UNSURE, Person, nearness_of
+
+# Lengths of the smooth curve of a hand's shift to the skin, seconds: where it does not
+# touch, and where it does. A power of the contact lies between them, so that hands that only come
+# near do not bend the curve.
+_FADE, _STEADY, _POWER = 0.3, 0.08, 8
+_LITTLE = 0.01  # weight of the place that is known without the skin
+NONE = 1e-4  # shifts that are no change
+_DISC = 0.012  # radius of the piece of the skin around a point
+_FEWER = 4  # of so many points, one counts for whether another is inside
+_DEEP = 0.2  # distance up to which skin is near a hand: half the width of a stout body
+# Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
+# edge of something thin, or of an open mesh, the nearest point is aside.
+_BEHIND = 0.5
+# Hands are moved in rounds, at most so far in each. Gaps that are wider than those of the source
+# by less than the first are closed, by more than the second are between other parts.
+_ROUNDS, _FAST, _PULL = 12, 0.12, (0.06, 0.12)
+_PLACED = 30.0  # frames per second in which hands are placed
+_NOWHERE = 1e3  # coordinates of no point, relative to the height
+_ALMOST = 1.0 - 1e-6  # the curve leaves many arms exactly as long as possible, but for rounding
+
+
+def shifts_at_skin(
+    body: Body, solid: Solid, other: Body, person: Person, to_target: Floats, shifts: Floats,
+    timing: Timing,
+) -> Floats:  # fmt: skip
+    """Return smooth shifts (2, N, 3) of wrists with which hands keep the gaps of the source.
+
+    ``shifts``: (2, N, 3), those that are known without the skin.
+    """
+    aims = _aims(body, solid, other, person, to_target, shifts)
+    sides = np.stack([_side(other, number) @ to_target.T for number in range(len(ARMS))])
+    # Free rows pull the curve to 0 with a weight of 1, rows at the skin to their targets, so that
+    # waves longer than _STEADY pass. It also goes through rows between those that are placed.
+    pulls = (_FADE / _STEADY) ** 4 * person.holds**_POWER
+    every = max(round(timing.frame_rate / _PLACED), 1)
+    is_placed = np.zeros(aims.shape[1], dtype=bool)
+    for start, stop in spans_of(timing):
+        is_placed[start:stop:every] = True
+    pulls = np.where(is_placed, every * pulls, 0.0)
+    targets, touches = aims.copy(), np.where(is_placed, person.touches, 0.0)
+    result = _faded(body, targets, pulls, timing)
+    # Hands that are in the body of the source may be as deep in the figure's.
+    gaps = person.hand - np.clip(person.hand, -UNSURE, UNSURE)
+    arms = _Arms(body, np.flatnonzero(touches.any(axis=0)).astype(np.int32))
+    arms.bend(result)
+    near = [
+        skin
+        for number, touching in enumerate(touches)
+        for skin in _near(
+            solid, number, np.flatnonzero(touching).astype(np.int32), result[number], arms
+        )
+    ]
+    for _ in range(_ROUNDS if near else 0):
+        farthest = 0.0
+        for skin in near:
+            number, rows = skin.number, skin.rows
+            step = _steps(skin, result, arms, _FEWER * solid.area, gaps, sides)
+            length = lengths_of(step)
+            # The next curve starts from this one, so that steps which it smooths do not add up.
+            part = np.where(length > NONE, touches[number, rows], 0.0)
+            wished = part[:, None] * (result[number, rows] + step)
+            targets[number, rows] = (1.0 - part)[:, None] * targets[number, rows] + wished
+            farthest = max(farthest, float((part * length).max()))
+        if farthest < NONE:
+            break
+        result = _faded(body, targets, pulls, timing)
+        arms.bend(result)
+    return result
+
+
+def _aims(
+    body: Body, solid: Solid, other: Body, person: Person, to_target: Floats, shifts: Floats
+) -> Floats:
+    """Return shifts (2, N, 3) that put wrists as far from the skin as in the source, roughly."""
+    result = np.empty_like(shifts)
+    for number, arm in enumerate(ARMS):
+        own, is_held = body.at(arm[2]), person.holds[number] > 0.0
+        total, weights = _LITTLE * shifts[number], np.full(len(own), _LITTLE)
+        for name, gap in person.wrist[number].items():
+            around = [bone for bone in bones(body.place) if region_of(*bone) == name]
+            found = [from_bone(other, arm[2], *bone) for bone in around]
+            distances = np.linalg.norm([away for away, _ in found], axis=2)
+            for (start, end), (away, along), distance in zip(around, found, distances, strict=True):
+                weight = nearness_of(gap + distance - distances.min(axis=0))
+                weight = np.where(is_held, weight, 0.0)
+                nearest = body.at(start) + along[:, None] * (body.at(end) - body.at(start))
+                way = unit(away @ to_target.T)
+                radius = solid.radii(name, nearest, way, weight > 0.0)
+                weight[np.isnan(radius)] = 0.0
+                ends = nearest + (np.nan_to_num(radius) + gap)[:, None] * way
+                total += weight[:, None] ** 2 * (ends - own)
+                weights += weight**2
+        result[number] = total / weights[:, None]
+    # Hands that touch each other move by half of the difference each.
+    first, second = (body.at(arm[2]) + shift for arm, shift in zip(ARMS, result, strict=True))
+    between = (other.at(ARMS[1][2]) - other.at(ARMS[0][2])) @ to_target.T
+    half = 0.5 * together_in(other)[:, None] * (between - (second - first))
+    return result + np.stack([-half, half])
+
+
+def _faded(body: Body, targets: Floats, pulls: Floats, timing: Timing) -> Floats:
+    """Return curves (2, N, 3) through targets at the skin, which fade around them, within reach.
+
+    ``pulls``: (2, N), weights of the targets, relative to the weight of staying.
+    """
+    result = np.empty_like(targets)
+    for start, stop in spans_of(timing):
+        rows = slice(start, stop)
+        weights = 1.0 + pulls[:, rows]
+        aims = (pulls[:, rows] / weights)[..., None] * targets[:, rows]
+        result[:, rows] = smooth_curves(aims, weights, _FADE * timing.frame_rate)
+    return np.stack([within_reach(body, arm, each) for arm, each in zip(ARMS, result, strict=True)])
+
+
+def _side(other: Body, number: int) -> Floats:
+    """Return the direction of a wrist from the nearest bone of the trunk: (N, 3)."""
+    trunk = pairwise([name for name in PARTS[0] if name in other.place])
+    ways = np.stack([from_bone(other, ARMS[number][2], *bone)[0] for bone in trunk])
+    nearest = np.linalg.norm(ways, axis=2).argmin(axis=0)
+    side: Floats = unit(ways[nearest, np.arange(ways.shape[1])])
+    return side
+
+
+class _Arms:
+    """Arms of a body in some rows of its motion, as their wrists move."""
+
+    def __init__(self, body: Body, rows: Ints) -> None:
+        self.rows = rows
+        self.joints = [
+            (body.at(shoulder)[rows], body.at(elbow)[rows], body.at(wrist)[rows])
+            for shoulder, elbow, wrist in ARMS
+        ]
+        across = self.joints[0][0] - self.joints[1][0]
+        uppers = [unscaled(body.world[rows, body.place[arm[0]], :3, :3]) for arm in ARMS]
+        self.axes = [
+            hinges(upper, points, across) for upper, points in zip(uppers, self.joints, strict=True)
+        ]
+
+    def bend(self, shifts: Floats) -> None:
+        """Move the wrists by shifts (2, N, 3), of which those in the rows count."""
+        self.shifts = shifts[:, self.rows]
+        # Of each part of an arm, and of all others in the end: x' = A x + b.
+        self.linear = np.tile(np.eye(3), (len(ARMS), len(self.rows), 4, 1, 1))
+        self.offsets = np.zeros((len(ARMS), len(self.rows), 4, 3))
+        for arm, (points, shift) in enumerate(zip(self.joints, self.shifts, strict=True)):
+            shoulder, elbow, wrist = points
+            turns = bend(*points, wrist + shift, self.axes[arm])
+            upper, lower = (quaternion_to_matrix(turn) for turn in turns)
+            bent = shoulder + np.einsum("rab,rb->ra", upper, elbow - shoulder)
+            self.linear[arm, :, :2] = np.stack([upper, lower], axis=1)
+            self.offsets[arm, :, 0] = shoulder - np.einsum("rab,rb->ra", upper, shoulder)
+            self.offsets[arm, :, 1] = bent - np.einsum("rab,rb->ra", lower, elbow)
+            self.offsets[arm, :, 2] = shift
+
+    def moved(
+        self, arm: int, rows: Ints, parts: Ints, points: Floats, normals: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return points and normals (R, P, 3) of the skin, of which some parts (R, P) are an arm's.
+
+        All are where they are without changes of the arms.
+        """
+        if (parts < 0).all():
+            return points, normals
+        index = np.searchsorted(self.rows, rows)[:, None]
+        linear, offsets = self.linear[arm, index, parts], self.offsets[arm, index, parts]
+        return (
+            np.einsum("rpab,rpb->rpa", linear, points) + offsets,
+            np.einsum("rpab,rpb->rpa", linear, normals),
+        )
+
+    def within_reach(self, arm: int, rows: Ints, steps: Floats) -> Floats:
+        """Return steps (R, 3) of a wrist: straight arms can only swing about the shoulder."""
+        index = np.searchsorted(self.rows, rows)
+        shoulder, elbow, wrist = (each[index] for each in self.joints[arm])
+        longest = _ALMOST * EXTENDED * (lengths_of(elbow - shoulder) + lengths_of(wrist - elbow))
+        line = wrist + self.shifts[arm, index] - shoulder
+        outward = np.einsum("ra,ra->r", unit(line), steps)
+        # Along the tangent t, the way s out of the skin takes s^2 / t.
+        swing = steps - outward[:, None] * unit(line)
+        length = np.einsum("ra,ra->r", steps, steps) / np.maximum(lengths_of(swing), 1e-30)
+        is_straight = (outward > 0.0) & (lengths_of(line) >= longest)
+        swing = np.minimum(length, _FAST)[:, None] * unit(swing)
+        return np.where(is_straight[:, None], swing, steps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _NearSkin:
+    """A hand and the skin near it in some rows, where they are without changes of the arms."""
+
+    number: int
+    """0 or 1, as of ``ARMS``."""
+    rows: Ints
+    """(R,). Rows of the motion."""
+    own: Floats
+    """(R, H, 3). Points of the hand."""
+    parts: Ints
+    """(R, P). Parts of the points of the skin, as in ``SkinPoints``."""
+    points: Floats
+    normals: Floats
+    """(R, P, 3). Rows with fewer points have some that are far from everything."""
+    whole: Singles
+    """(2, R, S, 3). Points and normals of the skin without the hand's arm, in single precision."""
+
+
+def _near(
+    solid: Solid, number: int, rows: Ints, shifts: Floats, arms: _Arms
+) -> Iterator[_NearSkin]:
+    """Yield batches of rows of a hand that is moved by shifts (N, 3), with the skin near it."""
+    others = np.flatnonzero(solid.points.arms != number).astype(np.int32)
+    for batch in batches(rows):
+        own = solid.posed(batch, solid.hands[number])[0]
+        points, normals = solid.posed(batch, others)
+        parts = np.broadcast_to(solid.points.parts[others], points.shape[:2])
+        moved, _ = arms.moved(1 - number, batch, parts, points, normals)
+        ends = own + shifts[batch, None]
+        centres = ends.mean(axis=1, keepdims=True)
+        reach = lengths_of(ends - centres).max(axis=1, keepdims=True) + _DEEP
+        is_near = lengths_of(moved - centres) < reach
+        holds, each = np.flatnonzero(is_near.any(axis=1)), np.arange(len(own))[:, None]
+        if not len(holds):
+            continue
+        # Those that are near come first.
+        order = np.argsort(~is_near, axis=1, kind="stable")[:, : is_near.sum(axis=1).max()]
+        near = np.where(is_near[each, order][..., None], points[each, order], _NOWHERE)
+        whole = np.stack([points, normals])[:, :, ::_FEWER].astype(np.float32)
+        yield _NearSkin(
+            number, batch[holds], own[holds], parts[each, order][holds], near[holds],
+            normals[each, order][holds], whole[:, holds],
+        )  # fmt: skip
+
+
+def _steps(
+    skin: _NearSkin, shifts: Floats, arms: _Arms, area: float, gaps: Floats, sides: Floats
+) -> Floats:
+    """Return translations (R, 3) of a hand to its gaps from the skin near it.
+
+    ``area``: of the pieces of the whole skin.
+    """
+    number, rows, parts = skin.number, skin.rows, skin.parts
+    own, each = skin.own + shifts[number, rows, None], np.arange(len(rows))[:, None]
+    others, normals = arms.moved(1 - number, rows, parts, skin.points, skin.normals)
+    squares = np.einsum("rpa,rpa->rp", others, others)[:, None]
+    nearest = (squares - 2.0 * own @ others.swapaxes(1, 2)).argmin(axis=2)
+    away, outward = own - others[each, nearest], normals[each, nearest]
+    heights = np.einsum("rha,rha->rh", away, outward)
+    distances = lengths_of(away)
+    aside = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
+    is_inside = heights < -_BEHIND * distances
+    # Behind the inner face of a piece of armour is no inside.
+    deep = is_inside & (heights < -UNSURE)
+    unsure = np.flatnonzero(deep.any(axis=1))
+    if len(unsure):
+        whole, normals_there = skin.whole[:, unsure]
+        is_enclosed = encloses(whole, normals_there, area, own[unsure])
+        is_inside[unsure] &= ~deep[unsure] | is_enclosed
+    # Points of the skin are discs as wide as the distances between them.
+    clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - _DISC, 0.0)))
+    each, first = each[:, 0], clear.argmin(axis=1)
+    missing = np.maximum(gaps[number, rows, None] - clear, 0.0)
+    # What is farther is another part than the source's hand touches.
+    excess = clear[each, first] - gaps[number, rows]
+    near = falling((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))
+    pull = -(near * excess)[:, None] * unit(away[each, first])
+    # The mean direction out, on the side of the part on which the hand is.
+    ways = np.where((parts[each[:, None], nearest] < 0)[..., None], sides[number, rows, None], 0.0)
+    inwards = np.minimum(np.einsum("rha,rha->rh", outward, ways), 0.0)
+    way = unit(np.einsum("rh,rha->ra", missing, outward - inwards[..., None] * ways))
+    cosine = np.maximum(np.einsum("ra,ra->r", way, outward[each, first]), 0.5)
+    push = np.minimum(missing[each, first] / cosine, _FAST)[:, None] * way
+    # Of two hands, each gives way by half.
+    give = np.where(parts[each, nearest[each, first]] == 2, 0.5, 1.0)
+    step = give[:, None] * np.where((missing[each, first] > 0.0)[:, None], push, pull)
+    return arms.within_reach(number, rows, step)
