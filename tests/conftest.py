@@ -13,6 +13,7 @@ import moderngl
 import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 from run_time import RunTime
 
 from viewer.diagnostics import Diagnostic
@@ -36,9 +37,12 @@ FIRST = ("tests/batching/engines/", "tests/test_interrupts.py", "tests/test_wind
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
-# Every run tries the same examples, without a time limit.
+# Every run tries the same examples, without a time limit. Hypothesis would also choose from the
+# constants of all modules that happen to be loaded: other examples in each process, after 4 s of
+# reading sources.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile("fixed")
+providers._get_local_constants = lambda: providers._local_constants
 
 
 def pytest_configure(config: pytest.Config) -> None:
