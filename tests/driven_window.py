@@ -34,7 +34,7 @@ def _wait_for(condition, what):
         found = condition()
         if found is not None and found is not False:
             return found
-        time.sleep(0.05)
+        time.sleep(0.1)  # a look at the screen takes a tenth of this
     raise AssertionError(f"not seen within {PATIENCE:g} s: {what}")
 
 
@@ -107,7 +107,7 @@ class Window:
         return done.stdout.strip()
 
     def screen(self):
-        # RGB, not copied: while a test waits, it looks twenty times a second.
+        # RGB, not copied: while a test waits, it looks ten times a second.
         return np.asarray(ImageGrab.grab(xdisplay=self.display))
 
     def wait_until_quiet(self, still=0.25):

@@ -332,11 +332,12 @@ def surface(figure):
 
     seen = [
         (round(x + across), round(y + down))
-        for down in np.linspace(0.2, 0.8, 25) * height
-        for across in np.linspace(0.2, 0.8, 25) * width
+        for down in np.linspace(0.2, 0.8, 13) * height
+        for across in np.linspace(0.2, 0.8, 13) * width
         if is_inside(across, down)
     ]
     driver.close()
+    assert len(seen) >= 3
     middle = (tab.min.x + 0.3 * (tab.max.x - tab.min.x), (tab.min.y + tab.max.y) / 2)
     return middle, seen
 
