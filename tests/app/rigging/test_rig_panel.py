@@ -269,21 +269,6 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     hand.assert_sane()
 
 
-def test_report_states_how_the_alignment_was_found(rigging, texts):
-    hand = rigging(placed=False)
-    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
-    hand.step(2)
-    hand.click("Align")
-    hand.finish_job()
-    hand.click("Run")
-    hand.finish_job()
-    rigged = hand.state.of(Rigging).results["robust"].rigged
-    keys = ["R001.alignment", "R001.error", "R003.pose", "R003.gap", "R005.matched"]
-    assert [line.key for line in rigged.lines[:5]] == keys
-    assert str(rigged.lines[0].values["how"]) == "found by fitting pose and proportions"
-    assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
-
-
 def test_rig_that_is_probably_wrong_is_kept_or_discarded(rigging, texts, monkeypatch):
     doubt = Finding("R017.inside: only {value:.0%} of the bones are inside the mesh", 0.2, 0.3, 0.7)
     monkeypatch.setattr(work, "judge", lambda *_, **__: (doubt,))

@@ -108,7 +108,7 @@ def test_progress_shows_step_and_fraction(rigging, texts, monkeypatch):
     hand.finish_job()
 
 
-def test_template_is_posed_to_fit_and_shown_in_the_fitted_pose(rigging, texts):
+def test_template_is_posed_to_fit_shown_in_the_fitted_pose_and_reported(rigging, texts):
     hand = rigging(placed=False)
     actor = hand.state.scene.actors[1]
     # The tip of the target is rotated by a further half radian.
@@ -130,6 +130,12 @@ def test_template_is_posed_to_fit_and_shown_in_the_fitted_pose(rigging, texts):
     assert actor.pose.dofs[8] == 0.2  # the pose of the actor is unchanged
     hand.click("Run")
     hand.finish_job()
+    # The report states how the alignment was found.
+    rigged = state.of(Rigging).results["robust"].rigged
+    keys = ["R001.alignment", "R001.error", "R003.pose", "R003.gap", "R005.matched"]
+    assert [line.key for line in rigged.lines[:5]] == keys
+    assert str(rigged.lines[0].values["how"]) == "found by fitting pose and proportions"
+    assert rigged.lines[2:4] == state.of(Rigging).placing.lines
     stop(hand)
     assert_allclose(seen(hand, 0), wanted, atol=1e-6)
     assert state.error == ""
