@@ -321,15 +321,16 @@ def test_values_are_typed_in_the_shown_unit(curves):
     assert _arm(curves).values[1] == 0.25
 
 
-@pytest.mark.parametrize("text", ["nan", "inf", "-1e300", "1e999", "", "abc"])
-def test_invalid_typed_value_has_no_effect(curves, text):
+def test_invalid_typed_values_have_no_effect(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
-    for label in ("Time", "Value"):
-        _type_into(curves, label, text)
-    assert np.isfinite(_arm(curves).values).all() and np.abs(_arm(curves).values).max() <= 0.6
-    assert np.abs(_arm(curves).times).max() <= 2.0
-    curves.assert_sane()
+    for text in ("nan", "inf", "-1e300", "1e999", "", "abc"):
+        for label in ("Time", "Value"):
+            _type_into(curves, label, text)
+        assert np.isfinite(_arm(curves).values).all(), text
+        assert np.abs(_arm(curves).values).max() <= 0.6, text
+        assert np.abs(_arm(curves).times).max() <= 2.0, text
+        curves.assert_sane()
 
 
 # Extrapolation, range and time

@@ -25,15 +25,15 @@ from viewer.rigs.scene import Actor
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 
 
-@pytest.mark.parametrize("label", SLIDERS)
-def test_slider_drag_changes_only_its_dof_as_one_undo_step(hand, label):
+def test_slider_drag_changes_only_its_dof_as_one_undo_step(hand):
     before = hand.dofs()
-    hand.drag(label, 0.8)
-    changed = np.flatnonzero(hand.dofs() != before)
-    assert changed.tolist() == [hand.dof_index(label)]
-    assert hand.undo_steps == 1
-    hand.key("z", "ctrl")
-    assert (hand.dofs() == before).all()
+    for label in SLIDERS:
+        hand.drag(label, 0.8)
+        changed = np.flatnonzero(hand.dofs() != before)
+        assert changed.tolist() == [hand.dof_index(label)]
+        assert hand.undo_steps == 1
+        hand.key("z", "ctrl")
+        assert (hand.dofs() == before).all() and hand.undo_steps == 0
 
 
 def test_slider_follows_the_mouse_over_the_range_of_its_limits(hand):
