@@ -7,8 +7,10 @@ import pytest
 from autorig.rigged_shapes import arm, mesh_of, turn
 from faults import told
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.checks import check_lines
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import clip_for, start_of_clips
 from viewer.autorig.settings import METHODS, TransferSettings
@@ -23,6 +25,7 @@ from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor, pose_actors
+from viewer.rigs.skin import skin_from_entries
 from viewer.rigs.skinning import deform, joint_matrices
 
 pytestmark = pytest.mark.slow
@@ -267,6 +270,36 @@ def test_joint_outside_the_target_is_reported():
     (outside,) = [line for line in rigged.lines if line.code == "R009"]
     assert outside.places.tolist() == [0, 1] and outside.values == {"names": ["base", "tip"]}
     assert outside.labelled == "warning: joints outside the mesh: base, tip"
+
+
+def test_weights_that_tear_when_a_joint_rotates_are_reported():
+    figure = arm()
+    kept = np.zeros(figure.mesh.n_vertices, dtype=bool)
+    # The joints blend over four rings around the second one, which is at y = 1.
+    assert not [line for line in check_lines(figure, kept, (), 0.0) if line.code == "R018"]
+    # A step between the rings at 1.7 and 1.8.
+    beyond = figure.mesh.positions[:, 1] > 1.75
+    every = np.arange(len(beyond))
+    skin = skin_from_entries(
+        len(beyond), every, beyond.astype(int), np.ones(len(beyond)), figure.skin.inverse_bind
+    )
+    figure = replace(figure, skin=skin)
+    (line,) = [line for line in check_lines(figure, kept, (), 0.0) if line.code == "R018"]
+    assert line.labelled.startswith("warning: the mesh may tear where it moves with tip: rotated")
+    assert_allclose(figure.mesh.positions[line.places, 1].min(), 1.7)
+    assert_allclose(figure.mesh.positions[line.places, 1].max(), 1.8)
+    ends, pulled = [line.values["one"], line.values["other"]], []
+    offset = np.diff(figure.mesh.positions[ends], axis=0)
+    for angle in np.linspace(0.0, np.pi, 30):
+        pose = rest_pose(figure.skeleton)
+        # Rotation by 60 degrees about horizontal axes: angles about x, then y, then z.
+        axis = [np.cos(angle), 0.0, np.sin(angle)]
+        pose.dofs[6:] = Rotation.from_rotvec(np.pi / 3 * np.array(axis)).as_euler("xyz")
+        there = deform(figure, pose)[0][ends]
+        pulled.append(np.linalg.norm(np.diff(there, axis=0) - offset))
+    size = np.linalg.norm(np.ptp(figure.mesh.positions, axis=0))
+    # The joint's distance from the middle of the edge stands for that from its ends.
+    assert line.values["gap"] == pytest.approx(max(pulled) / size, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -7,20 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.autorig.surface.welding import edges
 from viewer.autorig.transfer.joint_transfer import outside
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
-from viewer.phrases import counted, listed
+from viewer.phrases import agree, counted, listed
 from viewer.rigs.arrays import Bools, Floats
 from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.transform import apply_transform
+from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import joint_label
+from viewer.rigs.skin import bind_positions
 from viewer.rigs.skinning import deform, joint_matrices
 
 _EXACT = 1e-4  # ratio of residual to size above which a warning is given
 
+# Edges that tear if one joint rotates: by how much their ends move apart, as a fraction of the
+# size, and relative to their length. Of 23 rigs of people, animals and robots, 18 have no joint
+# with as many such edges; the others have spikes at a belt, a collar or a jaw.
+_BEND = np.radians(60.0)
+_GAP, _LONGER, _FEWEST = 0.05, 2.0, 4
 
 FARTHEST = 1e9
 """Largest coordinate of a mesh to rig and of a landmark, in any unit. With coordinates of 1e30, the
@@ -95,6 +103,7 @@ def check_lines(
             vertices,
             values,
         )
+    yield from _torn_lines(figure)
     yield note(
         "R011.residual: after posing, the mesh differs from the target by at most "
         "{residual:.3%} of its size",
@@ -106,6 +115,56 @@ def check_lines(
             "{limit:.2%} of its size",
             limit=_EXACT,
         )
+
+
+def _torn_lines(figure: Figure) -> Iterator[Diagnostic]:
+    """Return a message about places that tear when a joint rotates.
+
+    Where neighbours have the weights a and b of all joints below one at the distance r, and it
+    rotates by t about the worst axis, they move apart by 2 |a - b| r sin(t / 2).
+    """
+    from scipy import sparse
+
+    mesh, skeleton, skin = figure.attached()
+    links, count = edges(mesh.triangles), skin.n_joints
+    weights = sparse.csr_array(
+        (skin.weights, skin.joints, skin.starts), shape=(skin.n_vertices, count)
+    )
+    below = np.stack([descendants(skeleton.parents, joint) for joint in range(count)], axis=1)
+    total = weights @ sparse.csr_array(below.astype(float))
+    steps = sparse.coo_array(total[links[:, 0]] - total[links[:, 1]])
+    rows, joints = steps.coords
+    ends = mesh.positions[links]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    arms = np.linalg.norm(ends.mean(axis=1)[rows] - bind_positions(skin)[joints], axis=1)
+    gaps = 2.0 * np.sin(0.5 * _BEND) * np.abs(steps.data) * arms
+    size = box_size(bounding_box(mesh.positions))
+    torn = np.flatnonzero((gaps > _GAP * size) & (gaps > _LONGER * lengths[rows]))
+    # An edge may tear by several joints of a chain: the one that tears it most is named.
+    torn = torn[np.argsort(-gaps[torn], kind="stable")]
+    torn = torn[np.unique(rows[torn], return_index=True)[1]]
+    numbers = np.bincount(joints[torn], minlength=count)
+    torn = torn[numbers[joints[torn]] >= _FEWEST]
+    if len(torn) == 0:
+        return
+    worst = torn[gaps[torn].argmax()]
+    named = np.unique(joints[torn])
+    named = named[np.argsort(-numbers[named], kind="stable")]
+    yield Diagnostic(
+        "R018.torn: the mesh may tear where it moves with {joints}: rotated by 60°, {them} would "
+        "pull vertices up to {gap:.0%} of the size apart (vertices {one} and {other})",
+        None,
+        None,
+        "weights",
+        np.unique(links[rows[torn]]).astype(np.int32),
+        {
+            "joints": listed([joint_label(skeleton, joint) for joint in named.tolist()], 4),
+            "them": agree(len(named), "it", "they"),
+            "gap": float(gaps[worst]) / size,
+            "one": int(links[rows[worst], 0]),
+            "other": int(links[rows[worst], 1]),
+        },
+    )
 
 
 def with_joint_name(line: Diagnostic, figure: Figure) -> Diagnostic:

@@ -287,6 +287,11 @@ CODES: dict[str, Code] = {
             "specify --up, --facing or --landmarks, or use another template",
         ),
     ),
+    "R018": Code(
+        "warning",
+        "weights that tear in a pose",
+        "pose these joints, and smooth the weights around them",
+    ),
     # Plug-ins; other codes with "P" are those of their checks.
     "P000": Code(
         "error",
