@@ -4,7 +4,13 @@ import pytest
 from app.tiny import write_rig
 from commands.drawn_motions import anim_text
 
+import viewer
 from viewer.cli import run
+from viewer.commands import rig
+from viewer.exporters import export
+from viewer.rigs.figure import Figure
+from viewer.rigs.mesh import Mesh, vertex_normals
+from viewer.rigs.scene import Actor
 
 
 @pytest.fixture
@@ -32,3 +38,41 @@ def draw(tmp_path, capsys):
         return said
 
     return command
+
+
+@pytest.fixture(scope="session")
+def scan_folder(tmp_path_factory):
+    """A folder with the mesh of a fox in centimetres, rotated by 90 degrees about y, scan.obj."""
+    folder = tmp_path_factory.mktemp("scan")
+    fox = viewer.load().actors[0]
+    positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
+    mesh = fox.figure.mesh
+    target = Mesh(
+        positions,
+        vertex_normals(positions, mesh.triangles),
+        mesh.triangles,
+        uvs=mesh.uvs,
+        uv_triangles=mesh.uv_triangles,
+    )
+    export(Actor(Figure("scan", target)), folder / "scan.obj")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def transferred():
+    """Results of transfers by their arguments."""
+    return {}
+
+
+@pytest.fixture
+def transfer_once(transferred, monkeypatch):
+    """Rig a mesh once in the same way: most tests differ only in what becomes of the result."""
+    transfer = rig.transfer
+
+    def kept(figure, pose, target, settings, name):
+        key = (figure.name, pose.dofs.tobytes(), target.positions.tobytes(), repr(settings), name)
+        if key not in transferred:
+            transferred[key] = transfer(figure, pose, target, settings, name)
+        return transferred[key]
+
+    monkeypatch.setattr(rig, "transfer", kept)

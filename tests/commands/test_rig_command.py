@@ -19,25 +19,12 @@ from viewer.rigs.pose import rest_pose
 from viewer.rigs.scene import Actor
 from viewer.rigs.skeleton import ball_skeleton
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits", "transfer_once")]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A fox in centimetres, rotated by 90 degrees about y, and the pose of the fox."""
-    folder = tmp_path_factory.mktemp("rig")
-    fox = viewer.load().actors[0]
-    positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
-    mesh = fox.figure.mesh
-    target = Mesh(
-        positions,
-        vertex_normals(positions, mesh.triangles),
-        mesh.triangles,
-        uvs=mesh.uvs,
-        uv_triangles=mesh.uv_triangles,
-    )
-    export(Actor(Figure("scan", target)), folder / "scan.obj")
-    return folder
+@pytest.fixture
+def folder(scan_folder):
+    return scan_folder
 
 
 @pytest.fixture

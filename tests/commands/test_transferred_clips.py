@@ -6,27 +6,19 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.exporters import export
 from viewer.formats import write
-from viewer.rigs.figure import Figure
-from viewer.rigs.mesh import Mesh, vertex_normals
 from viewer.rigs.motion.clip_edit import clip_from_frames
-from viewer.rigs.scene import Actor, pose_actors
+from viewer.rigs.scene import pose_actors
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
-
-TURN = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits", "transfer_once")]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A fox scaled by 100 and rotated by 90 degrees, and a clip in which the fox walks along z."""
+def folder(tmp_path_factory, scan_folder):
+    """The scan of a fox, and a clip in which the fox walks along z."""
     folder = tmp_path_factory.mktemp("clips")
+    (folder / "scan.obj").write_bytes((scan_folder / "scan.obj").read_bytes())
     fox = viewer.load().actors[0]
-    positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0] @ np.transpose(TURN)
-    triangles = fox.figure.mesh.triangles
-    mesh = Mesh(positions, vertex_normals(positions, triangles), triangles)
-    export(Actor(Figure("scan", mesh)), folder / "scan.obj")
     dofs = np.tile(fox.pose.dofs, (2, 1))
     dofs[1, 2] += 0.6
     dofs[1, fox.figure.skeleton.names.index("jaw") + 3] += 0.1

@@ -97,7 +97,7 @@ def converting(inputs: Inputs) -> dict[str, list[str]]:
             ("m.npz",),
             ("m.npz", "--gaps", "split"),
             ("m.npz", "--as", "npz"),
-            ("m_{frame}.obj", "--frames", "20:24"),
+            ("m_{frame}.obj", "--frames", "21:23"),
             ("m.ply", "--frame", "20"),
         )
     }
