@@ -224,7 +224,7 @@ MUTATIONS = [
 
 
 @pytest.mark.parametrize("path", FILES)
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(5))
 def test_mutated_file_is_read_or_refused_in_one_line(path, seed):
     rng = random.Random(seed)
     for _ in range(150):
@@ -241,7 +241,8 @@ def test_truncated_file_is_read_or_refused_in_one_line(path):
 @pytest.mark.parametrize("token", [b"{", b"}", b" ", b"-", b"x", b"\0", b"9", b".", b"\x1a"])
 def test_file_with_an_inserted_letter_is_read_or_refused_in_one_line(path, token):
     data = FILES[path]
-    for at in range(0, len(data), 2):
+    # Together, the letters are inserted everywhere.
+    for at in range(token[0] % 4, len(data), 4):
         check(path, data[:at] + token + data[at:])
 
 
@@ -260,7 +261,7 @@ def test_file_with_only_extreme_numbers_can_be_posed():
 
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=60), st.sampled_from(sorted(FILES)))
-@settings(max_examples=400)
+@settings(max_examples=200)
 def test_random_words_are_read_or_refused_in_one_line(words, path):
     check(path, b" ".join(words))
 
@@ -272,7 +273,7 @@ def test_random_bytes_are_read_or_refused_in_one_line(data, path):
 
 
 @given(st.data(), st.sampled_from(sorted(FILES)))
-@settings(max_examples=300)
+@settings(max_examples=150)
 def test_file_with_replaced_words_is_read_or_refused_in_one_line(data, path):
     words = re.split(rb"(\s+|[{}])", FILES[path])
     places = st.integers(0, len(words) - 1)

@@ -47,14 +47,14 @@ def test_file_truncated_anywhere_is_read_or_refused_in_one_line(data):
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
 def test_file_with_any_byte_changed_is_read_or_refused_in_one_line(data):
     for place in range(len(data)):
-        for change in (0x01, 0x20, 0x80, 0xFF):
+        for change in (0x01, 0x80) if place % 2 else (0x20, 0xFF):
             self_contained(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])
 
 
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
 def test_file_with_random_damage_is_read_or_refused_in_one_line(data):
     dice = random.Random(len(data))
-    for _ in range(1500):
+    for _ in range(750):
         damaged = bytearray(data)
         for _ in range(dice.randint(1, 4)):
             place = dice.randrange(len(damaged))

@@ -120,7 +120,7 @@ def converted(array, dtype):
             return np.zeros(array.shape, dtype)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_mutated_folder_is_read_or_refused_in_one_line(tmp_path, seed):
     rng = random.Random(seed)
     folder = write(tmp_path / "pig")
@@ -133,17 +133,18 @@ def test_mutated_folder_is_read_or_refused_in_one_line(tmp_path, seed):
 
 @pytest.mark.parametrize("word", ["nan", "1e39", "3.4e38", "-1", "99999999999", "0.5", "x", "1 1"])
 def test_folder_with_any_number_replaced_is_read_or_refused_in_one_line(tmp_path, word):
-    folder = write(tmp_path / "pig")
+    folder, first = write(tmp_path / "pig"), 2 * (len(word) % 6)
     for name, text in GOOD.items():
         words = re.split(r"(\s+)", text)
-        for at in range(0, len(words), 2 if len(words) < 30 else 6):
+        is_short = len(words) < 30
+        for at in range(0 if is_short else first, len(words), 2 if is_short else 12):
             (folder / name).write_text("".join([*words[:at], word, *words[at + 1 :]]))
             check(Source.open(folder))
         (folder / name).write_text(text)
 
 
 @pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_changed_arrays_are_read_or_refused_in_one_line(name, seed):
     rng = random.Random(seed)
     for _ in range(60):
