@@ -1,5 +1,6 @@
 """Feet that were planted or held do not slide: detector and limits are those of the planner."""
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from rigs.retargeting.test_standing_feet import jerky_walk
 from rigs.retargeting.walking import RATE, walk
 
 from viewer.exporters import ExportOptions
-from viewer.linting import lint_scene
+from viewer.linting import _running, lint_scene
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.loading.cleaning import clean_up
 from viewer.loading.settings import CleanUp
@@ -32,13 +33,26 @@ MOTIONS = {
 }
 
 
-def path_of(name: str, folder: Path) -> Path:
-    """Write a motion as a BVH file."""
-    path = folder / f"{name}.bvh"
-    motion = written(t_pose(), *MOTIONS[name](), rate=RATE)
-    actor = Actor(motion.figure, clip=motion.clip)
-    export_frames(sample_animation(actor), path, "bvh", ExportOptions())
-    return path
+@pytest.fixture(scope="module")
+def path_of(tmp_path_factory):
+    """The BVH files of motions by name, each written once."""
+    folder = tmp_path_factory.mktemp("motions")
+
+    @functools.cache
+    def path_of(name: str) -> Path:
+        path = folder / f"{name}.bvh"
+        motion = written(t_pose(), *MOTIONS[name](), rate=RATE)
+        actor = Actor(motion.figure, clip=motion.clip)
+        export_frames(sample_animation(actor), path, "bvh", ExportOptions())
+        return path
+
+    return path_of
+
+
+@pytest.fixture(autouse=True)
+def only_feet(monkeypatch):
+    """Run the check of feet alone: those of the body take longer."""
+    monkeypatch.setattr(_running, "CHECKS", {"feet": _running.CHECKS["feet"]})
 
 
 def slides(scene: Scene) -> list[str]:
@@ -46,24 +60,24 @@ def slides(scene: Scene) -> list[str]:
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_planted_feet_do_not_slide(name, tmp_path):
-    scene = load(path_of(name, tmp_path), bundled_body())
+def test_planted_feet_do_not_slide(name, path_of):
+    scene = load(path_of(name), bundled_body())
     assert any(note.key == "F007.feet-planted" for note in scene.diagnostics)
     assert slides(scene) == []
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_locked_feet_of_a_capture_do_not_slide(name, tmp_path):
-    scene = load(path_of(name, tmp_path), bundled_body(), motion=MotionSettings(feet=False))
+def test_locked_feet_of_a_capture_do_not_slide(name, path_of):
+    scene = load(path_of(name), bundled_body(), motion=MotionSettings(feet=False))
     assert "X006.locked" in {note.key for note in clean_up(scene, CleanUp(locks_feet=True))}
     assert slides(scene) == []
 
 
 def test_feet_of_short_legs_do_not_slide_where_those_of_the_motion_are_lifted(
-    shared_data: Path, tmp_path: Path
+    shared_data: Path, path_of
 ) -> None:
     knight = shared_data / "rigging" / "animated" / "kk_knight.glb"
-    scene = load(path_of("kneel", tmp_path), knight)
+    scene = load(path_of("kneel"), knight)
     (actor,) = scene.actors
     assert any(note.key == "F007.feet-planted" for note in scene.diagnostics)
     actor.figure = replace(actor.figure, animations=())  # other motions of its file
@@ -71,8 +85,8 @@ def test_feet_of_short_legs_do_not_slide_where_those_of_the_motion_are_lifted(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_feet_on_a_treadmill_are_held_under_noise(seed, tmp_path):
-    scene = load(path_of("treadmill", tmp_path), bundled_body(), motion=MotionSettings(feet=False))
+def test_feet_on_a_treadmill_are_held_under_noise(seed, path_of):
+    scene = load(path_of("treadmill"), bundled_body(), motion=MotionSettings(feet=False))
     (actor,), rng = scene.actors, np.random.default_rng(seed)
     clip = actor.clip
     turns = np.radians(0.5) * rng.normal(size=(*clip.rotations.shape[:2], 3))
@@ -86,7 +100,7 @@ def test_feet_on_a_treadmill_are_held_under_noise(seed, tmp_path):
     assert slides(scene) == []
 
 
-def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path):
+def test_feet_that_do_not_follow_their_legs_are_not_planted():
     """Of a rig for animators, whose feet are controls below the root."""
     figure = load(bundled_body()).actors[0].figure
     parents = figure.skeleton.parents.copy()

@@ -1,23 +1,19 @@
 """``viewer render`` of motions as videos with all frames at their rate and one camera."""
 
-import os
 import signal
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from children import listening
 from commands.drawn_motions import anim_text, frames, names, picture
+from forked_programs import VIEWER, Forker
 from PIL import Image
 
 import viewer
 
 pytestmark = pytest.mark.slow
 av = pytest.importorskip("av")
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture
@@ -39,20 +35,20 @@ def n_frames(path) -> int:
 # Videos
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
-def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
-    path = tmp_path / f"head{suffix}"
-    said = draw(fox, path.name)
-    wanted = f"{path}: 16 frames, 0.533 s, 64 x 48, 30 frames per second, "
-    assert said.out.startswith(wanted) and said.out.endswith(" MB\n")
-    shown = frames(path)
-    assert len(shown) == 16 and shown[0].shape == (48, 64, 3)
+def test_videos_show_the_whole_clip(draw, fox, tmp_path):
     draw(fox, "{frame}.png")
-    for frame in (0, 8, 15):
-        difference = np.abs(shown[frame] - picture(tmp_path / f"{frame}.png")[..., :3])
-        # The colours have half the resolution, or there are only 256.
-        assert difference.mean() < 4.0, frame
-    assert np.abs(shown[0] - shown[15]).mean() > 1.0
+    for suffix in (".mp4", ".webm", ".gif"):
+        path = tmp_path / f"head{suffix}"
+        said = draw(fox, path.name)
+        wanted = f"{path}: 16 frames, 0.533 s, 64 x 48, 30 frames per second, "
+        assert said.out.startswith(wanted) and said.out.endswith(" MB\n")
+        shown = frames(path)
+        assert len(shown) == 16 and shown[0].shape == (48, 64, 3)
+        for frame in (0, 8, 15):
+            difference = np.abs(shown[frame] - picture(tmp_path / f"{frame}.png")[..., :3])
+            # The colours have half the resolution, or there are only 256.
+            assert difference.mean() < 4.0, (suffix, frame)
+        assert np.abs(shown[0] - shown[15]).mean() > 1.0
 
 
 @pytest.mark.parametrize(
@@ -128,16 +124,16 @@ def test_gif_at_a_high_rate_reports_its_effective_rate(draw, walk, tmp_path):
     assert "51 frames, 1.02 s" in said.out and n_frames(tmp_path / "x.gif") == 51
 
 
-def test_videos_may_have_a_transparent_background(draw, fox, tmp_path):
-    said = draw(fox, "x.mp4", "--background", "transparent", "--no-grid")
+def test_videos_may_have_a_transparent_background(draw, walk, tmp_path):
+    said = draw(walk, "x.mp4", "--background", "transparent", "--no-grid")
     shown = f"{tmp_path / 'x.mp4'}: this format has no transparency; composited on black"
     assert said.err == f"warning: {shown}\n"
     assert frames(tmp_path / "x.mp4")[0][0, 0].max() <= 3
-    said = draw(fox, "x.webm", "--background", "transparent", "--no-grid")
+    said = draw(walk, "x.webm", "--background", "transparent", "--no-grid")
     assert said.err == ""
     with av.open(str(tmp_path / "x.webm")) as container:
         assert container.streams.video[0].metadata["alpha_mode"] == "1"
-    draw(fox, "x.gif", "--background", "transparent", "--no-grid")
+    draw(walk, "x.gif", "--background", "transparent", "--no-grid")
     with Image.open(tmp_path / "x.gif") as shown:
         alpha = np.array(shown.convert("RGBA"))[..., 3]
     assert alpha[0, 0] == 0 and alpha.max() == 255
@@ -159,11 +155,19 @@ def test_existing_video_is_replaced_only_with_force(draw, walk, tmp_path, name):
     assert len(frames(tmp_path / name)) == 31
 
 
-def start(walk, tmp_path, name) -> subprocess.Popen:
-    command = listening("-m", "viewer", "render", *walk, "-o", tmp_path / name)
+@pytest.fixture(scope="module")
+def forker():
+    kept = Forker()
+    yield kept
+    kept.close()
+
+
+@pytest.fixture
+def start(forker, walk, tmp_path):
+    """Return a function that starts a program that draws 6000 frames."""
     options = ["--turntable", "200", "--size", "320x240", "--force"]
-    return subprocess.Popen(
-        [*command, *options], env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE
+    return lambda name: forker.start(
+        VIEWER, ["render", *walk, "-o", tmp_path / name, *options], tmp_path
     )
 
 
@@ -182,20 +186,20 @@ def wait_for(condition) -> None:
         ("x.gif", signal.SIGINT, 130, b"interrupted"),
     ],
 )
-def test_interrupted_video_leaves_no_file(walk, tmp_path, name, number, code, word):
+def test_interrupted_video_leaves_no_file(start, tmp_path, name, number, code, word):
     (tmp_path / name).write_bytes(b"precious")
-    process = start(walk, tmp_path, name)
+    process = start(name)
     suffix = name[1:]
     wait_for(lambda: len(names(tmp_path, suffix)) > 1)  # the temporary file exists
-    time.sleep(0.3)
+    time.sleep(0.1)
     process.send_signal(number)
     _, error = process.communicate(timeout=60)
     assert (process.returncode, error.splitlines()[-1]) == (code, b"viewer: " + word)
     assert names(tmp_path, suffix) == [name] and (tmp_path / name).read_bytes() == b"precious"
 
 
-def test_interrupted_sequence_leaves_complete_images(walk, tmp_path):
-    process = start(walk, tmp_path, "{frame:04}.png")
+def test_interrupted_sequence_leaves_complete_images(start, tmp_path):
+    process = start("{frame:04}.png")
     wait_for(lambda: (tmp_path / "0005.png").exists())
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=60)
