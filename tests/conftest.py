@@ -181,6 +181,29 @@ def rig(tmp_path: Path) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
+def opened():
+    """Scenes by the options with which commands have opened them."""
+    return {}
+
+
+@pytest.fixture
+def read_once(opened, monkeypatch):
+    """Read the files of a command once, for tests that repeat it with other faults of outputs."""
+    from viewer.commands import convert, render
+    from viewer.commands._scene import open_scene
+    from viewer.rendering.recorder import copied
+
+    def open_copy(options):
+        key = repr(options)
+        if key not in opened:
+            opened[key] = open_scene(options)
+        return copied(opened[key])
+
+    for command in (convert, render):
+        monkeypatch.setattr(command, "open_scene", open_copy)
+
+
+@pytest.fixture(scope="module")
 def family(tmp_path_factory):
     """Figures of the SMPL family by kind, each read once."""
     from builders import family_figure

@@ -55,11 +55,13 @@ SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1, ".h
 BESIDE = {".skel": (".skin",)}
 
 
-@pytest.fixture
-def rig(tmp_path):
+pytestmark = pytest.mark.usefixtures("read_once")
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
     """A figure with two textures as files."""
-    folder = tmp_path / "in"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("in")
     of_triangle = np.array([0, 0, 1])
     mesh = seamed_mesh(pictures=(PICTURE, OTHER_PICTURE), of_triangle=of_triangle)
     export(seamed_actor(mesh=mesh), folder / "roof.skel")
@@ -183,7 +185,7 @@ def test_target_that_is_a_folder_is_refused(rig, tmp_path, capsys, suffix):
     target.mkdir()
     assert run(["convert", *rig, "-o", str(target), "--force"]) == 5
     assert capsys.readouterr().err == f"viewer: {target}: is a folder\n"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["in", target.name]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [target.name]
 
 
 def test_second_file_of_a_rig_that_is_a_folder_is_refused(rig, tmp_path, capsys):

@@ -128,7 +128,7 @@ def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path):
     assert 400 in again and len(again) <= 2 * LONGEST / 0.005
 
 
-def test_items_at_fault_are_found_within_tasks(spawned, tmp_path):
+def test_items_at_fault_are_found_within_tasks(tmp_path):
     some = items(400, crash=200, hang=300, **{"raise": 380})
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in some]
     found = finished(Job(seconds=0.005), some, Limits(2, retries=1, timeout=1.0, cluster="local"))
