@@ -13,7 +13,7 @@ from app.driver import Driver
 from app.tiny import write_rig
 from dragged_files import drag_and_vanish, drag_files
 from driven_window import IMPORTED, PATIENCE, ROOT, Window, _ask_to_close, _wait_for
-from forked_programs import Forker
+from forked_programs import VIEWER, Forker
 from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
 from PIL import Image, ImageGrab
@@ -403,13 +403,10 @@ def test_invalid_file_opens_no_window(display, tmp_path):
         ("MESA_GL_VERSION_OVERRIDE", "3.1", (b"OpenGL 3.3 is needed", b"offers 3.1")),
     ],
 )
-def test_old_opengl_opens_no_window(display, tmp_path, name, value, words):
+def test_old_opengl_opens_no_window(display, forker, tmp_path, name, value, words):
     environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT), name: value}
     environment |= {"XDG_STATE_HOME": str(tmp_path), "LIBGL_ALWAYS_SOFTWARE": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", "viewer", *write_rig(tmp_path)],
-        env=environment, capture_output=True, timeout=60, check=False,
-    )  # fmt: skip
+    done = forker.run(VIEWER, write_rig(tmp_path), tmp_path, environment)
     assert done.returncode == 4 and done.stdout == b"" and done.stderr.count(b"\n") == 1
     for word in (*words, b"renderer ", f"{name}={value}".encode()):
         assert word in done.stderr
