@@ -91,6 +91,19 @@ def test_pair_opens_as_one_figure_in_any_order(files, order):
     assert scene.actors[0].figure.is_attached
 
 
+def test_mesh_of_a_skin_in_a_file_of_its_own_is_shown_once(files, tmp_path):
+    # The files of ``viewer rig MESH -o x.skel``.
+    skel, skin = files("2.skel", "2.skin")
+    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0.25 0.75", "f 1/1 2/1 3/1"]
+    own, other = tmp_path / "own.obj", tmp_path / "other.obj"
+    own.write_text("\n".join(lines))
+    other.write_text("\n".join(["v 0 0 0.1", *lines[1:]]))
+    for paths in ([skel, skin, own], [own, skel, skin]):
+        (actor,) = viewer.load(*paths).actors
+        assert actor.figure.is_attached and actor.figure.mesh.uvs is not None
+    assert len(viewer.load(skel, skin, other).actors) == 2
+
+
 @pytest.mark.parametrize(
     ("order", "expected"),
     [
@@ -275,11 +288,11 @@ def test_missing_file_suggests_the_nearest_name(tmp_path):
 def test_folder_is_refused(tmp_path):
     wanted = (
         "expected a file, or a folder of PIG tables, EasyMocap frames or results of video motion "
-        "capture, found an unrecognised folder (viewer batch runs a command on each file of a "
-        "folder)"
+        "capture, found an unrecognised folder (to check each of its files: viewer batch lint "
+        "{}; other commands likewise)"
     )
-    assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
-    assert refusal("") == f".: {wanted}"
+    assert refusal(tmp_path) == f"{tmp_path}: {wanted.format(tmp_path)}"
+    assert refusal("") == f".: {wanted.format('.')}"
 
 
 def test_path_through_a_file_is_refused(files):

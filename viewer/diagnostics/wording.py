@@ -11,8 +11,8 @@ LAST_BRACE = 'F006.last-brace: {section}: missing "}}" at the end of the file'
 UNKNOWN = "F006.unknown: skipped unknown keyword {found}"
 UNKNOWN_FOLDER = (
     "F002.unknown-folder: expected a file, or a folder of PIG tables, EasyMocap frames "
-    "or results of video motion capture, found an unrecognised folder (viewer batch runs a "
-    "command on each file of a folder)"
+    "or results of video motion capture, found an unrecognised folder (to check each of its "
+    "files: viewer batch lint {folder}; other commands likewise)"
 )
 PICTURE = "F001.picture: unreadable image: {reason}"
 VIDEO = "F002.video: unsupported or damaged video"

@@ -333,7 +333,7 @@ def _detect_folder(source: Source) -> str:
     from viewer.formats._published_models import refuse_models
 
     refuse_models(source)
-    raise source.fault(wording.UNKNOWN_FOLDER)
+    raise source.fault(wording.UNKNOWN_FOLDER, folder=printable(source.path))
 
 
 def _is_archive(source: Source) -> bool:

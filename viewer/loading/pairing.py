@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from viewer.errors import FormatError, RigError
 from viewer.phrases import Remedy, counted
 from viewer.rigs.figure import Figure
+
+_DIGITS = 1e-5  # distance between vertices of one mesh in two files, relative to its size
 
 
 def joined_figures(
     figures: Sequence[tuple[Path, Figure]],
 ) -> list[tuple[tuple[int, ...], Figure]]:
     """Attach skins to their skeletons; return each figure with the indices of its parts."""
-    pairs = _pairs([figure for _, figure in figures])
+    pairs = _with_own_meshes(_pairs([figure for _, figure in figures]), figures)
     return [(pair, _join([figures[index] for index in pair])) for pair in pairs]
 
 
@@ -34,6 +38,36 @@ def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
                 pairs.append((index, partner))
     pairs += [(index,) for index in skeletons + skins]
     return sorted(pairs, key=min)
+
+
+def _with_own_meshes(
+    pairs: list[tuple[int, ...]], figures: Sequence[tuple[Path, Figure]]
+) -> list[tuple[int, ...]]:
+    """Add files that only contain the mesh of a skin to its pair: ``viewer rig`` writes both."""
+    found = [*pairs]
+    for pair in pairs:
+        figure = figures[pair[0]][1]
+        if len(pair) > 1 or figure.skeleton is not None or figure.skin is not None:
+            continue
+        for row, parts in enumerate(found):
+            if len(parts) == 2 and _is_same_mesh(figures[parts[1]][1], figure):
+                found[row] = (*parts, *pair)
+                found.remove(pair)
+                break
+    return sorted(found, key=min)
+
+
+def _is_same_mesh(one: Figure, other: Figure) -> bool:
+    """Return whether two files contain one mesh, up to the digits of their numbers."""
+    if one.mesh is None or other.mesh is None:
+        return False
+    places, others = one.mesh.positions, other.mesh.positions
+    if places.shape != others.shape or not len(places):
+        return False
+    close = _DIGITS * float(np.ptp(places, axis=0).max())
+    return bool(np.abs(places - others).max() <= close) and np.array_equal(
+        one.mesh.triangles, other.mesh.triangles
+    )
 
 
 def _is_complete(figure: Figure) -> bool:
@@ -76,6 +110,7 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
             skeleton=paths[0],
             joints=counted(skeleton.n_joints, "bind matrix"),
         )
-    facts = (*figures[0].facts, *figures[1].facts)
+    facts = tuple(fact for figure in figures for fact in figure.facts)
     origins = (*figures[0].origins, *figures[1].origins)
-    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts, origins=origins)
+    # A mesh from a file of its own has materials and texture coordinates.
+    return Figure(paths[1].stem, figures[-1].mesh, skeleton, skin, facts=facts, origins=origins)

@@ -53,6 +53,6 @@ def _folder(source: Source) -> Results:
         return _file(source.inside(single))
     tool = folder_tool(source, names)
     if tool is None:
-        raise source.fault(wording.UNKNOWN_FOLDER)
+        raise source.fault(wording.UNKNOWN_FOLDER, folder=printable(source.path))
     found: Results = module_of(tool).read_folder(source, names)
     return found
