@@ -165,6 +165,7 @@ def arm_of(names, shift=0.0):
     ("names", "here", "there"),
     [
         (("chest", "arm.L", "HandLeft"), ("arm.L", "HandLeft"), ("arm.R", "HandRight")),
+        (("chest", "l_a", "a_1_left_end"), ("l_a", "a_1_left_end"), ("r_a", "a_1_right_end")),
         (("chest", "joint", "tip"), ("joint_left", "tip_left"), ("joint_right", "tip_right")),
     ],
 )

@@ -185,6 +185,7 @@ _ASIDE = {
     *("twist", "roll", "end", "nub", "tip", "site", "ik", "pole", "target", "prop", "weapon"),
     *("patch", "pad", "armor", "armour", "plate", "guard", "muscle", "helper", "corrective"),
 }
+_LAST = {"end", "tip", "nub"}  # words for the end of a limb, after its side
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[左右](?=\w)|[^\W\d_A-Za-z]+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
 _FEW = 8  # number of joints below which numbers at the end are part of the names
@@ -232,8 +233,8 @@ _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "f
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     """Return each name's side, "left", "right" or "", and its remaining word in lower case.
 
-    >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
-    [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
+    >>> sided_words(["LeftFoot", "hip_01_r", "spine", "leg_1_left_end"])
+    [('left', 'foot'), ('right', 'hip01'), ('', 'spine'), ('left', 'leg1end')]
     """
     return [*_known_keys(tuple(names))]
 
@@ -585,8 +586,9 @@ def _key(tokens: list[str]) -> _Key:
             word = _word(tokens[1:] if end == 0 else tokens[:-1])
             if word.rstrip("0123456789") in _ROMANCE_WORDS:
                 return _INITIALS[tokens[end]], word
-    # Blender adds numbers after the side: f_index.01.L, but also thigh.L.001.
-    if len(tokens) > 2 and tokens[-2] in _SIDES and tokens[-1].isdigit():
+    # Blender adds numbers after the side: f_index.01.L, but also thigh.L.001. Skeletons found from
+    # a shape have a word there: leg_1_left_end.
+    if len(tokens) > 2 and tokens[-2] in _SIDES and (tokens[-1].isdigit() or tokens[-1] in _LAST):
         return _SIDES[tokens[-2]], _word([*tokens[:-2], tokens[-1]])
     if len(tokens) > 2 and tokens[1] in _SIDES and not tokens[0].isdigit():
         return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
