@@ -124,6 +124,16 @@ def rounded(value: float, digits: int = 3) -> Shown:
     return Shown(format(value, ",.0f" if is_long else f".{digits}g"), value)
 
 
+def percent(fraction: float) -> Shown:
+    """Format a fraction in percent; one below 1% keeps a digit, because 0% would say none.
+
+    >>> percent(0.183), percent(0.004), percent(-0.0001), percent(1.0)
+    ('18%', '0.4%', '0%', '100%')
+    """
+    digits = 0 if abs(fraction) >= 0.0095 else 1
+    return Shown(f"{round(100.0 * fraction, digits) + 0.0:g}%", fraction)
+
+
 def file_size(count: int) -> Shown:
     """Return a number of bytes as file managers show it: in powers of 1000.
 

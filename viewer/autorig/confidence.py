@@ -46,6 +46,7 @@ from viewer.autorig.surface.welding import weld
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
+from viewer.phrases import percent
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
@@ -117,7 +118,11 @@ class Finding:
     def line(self) -> Diagnostic:
         """Return the message about it."""
         named = {"joint": self.joint} if self.joint else {}
-        return note(self.sentence, value=self.value, **named)
+        # The values of ``{value}`` are fractions; those of ``{value:.2g}`` are not.
+        is_fraction = "{value}" in self.sentence
+        return note(
+            self.sentence, value=percent(self.value) if is_fraction else self.value, **named
+        )
 
     @property
     def rating(self) -> float:
@@ -236,7 +241,7 @@ def findings(
             good=0.5,
         ),
         Finding(
-            "R017.volume: the mesh collapses where joints bend (a test pose keeps {value:.0%} of "
+            "R017.volume: the mesh collapses where joints bend (a test pose keeps {value} of "
             "the volume that it keeps in the template)",
             _kept(target, parents, bones) / _kept(template, parents, bones),
             wrong=0.6,
@@ -265,13 +270,13 @@ def _bones_inside(template: Body, target: Body, bones: Ints, scale: float) -> tu
         return ()
     return (
         Finding(
-            "R017.inside: only {value:.0%} of the bones are inside the mesh",
+            "R017.inside: only {value} of the bones are inside the mesh",
             float((other[inside] > 0.0).mean()),
             wrong=0.3,
             good=0.7,
         ),
         Finding(
-            "R017.depth: the bones are outside the mesh or near its surface (at {value:.0%} of "
+            "R017.depth: the bones are outside the mesh or near its surface (at {value} of "
             "their depth in the template)",
             float(np.median(other[inside] / (scale * own[inside]))),
             wrong=0.1,
@@ -304,7 +309,7 @@ def _bones_in_legs(target: Body, parents: Ints, legs: tuple[LimbPair, ...]) -> t
     # Halfway between the limits, half of a leg is away from the bones.
     return (
         Finding(
-            "R017.legs: bones follow only {value:.0%} of the legs",
+            "R017.legs: bones follow only {value} of the legs",
             min(followed),
             wrong=0.25,
             good=0.75,
@@ -398,7 +403,7 @@ def _posture(
     # In 60 rigs that are right, it is 0.12 and more, 0.18 for a rabbit. With tufts of hair or lamps
     # of a helmet for arms, it is 0.01 to 0.08.
     low = Finding(
-        "R017.low: the head is only {value:.0%} of the trunk's length above the shoulders (it has "
+        "R017.low: the head is only {value} of the trunk's length above the shoulders (it has "
         "no neck, or the arms are hair or ears)",
         own,
         wrong=0.0,
@@ -409,7 +414,7 @@ def _posture(
         return tuple(found)  # people may raise their arms
     # People with outstretched arms have about 0; a rabbit with its ears for arms has 0.2 to 0.3.
     raised = Finding(
-        "R017.head: the middle of the arms is {value:.0%} of the trunk's length above head and "
+        "R017.head: the middle of the arms is {value} of the trunk's length above head and "
         "shoulders (they may be ears)",
         rises[1][0] - max(rises[1][1:]),
         wrong=0.2,
@@ -444,7 +449,7 @@ def _limbs_inside(
     # nearly all others are inside.
     return (
         Finding(
-            "R017.bone: most of the bone that ends at {joint} is outside the mesh ({value:.0%} is "
+            "R017.bone: most of the bone that ends at {joint} is outside the mesh ({value} is "
             "inside)",
             float(parts[least]),
             wrong=0.2,
@@ -469,7 +474,7 @@ def _apart(
     # People whose legs taper have 0.75 and more; with one leg missing, it is 0.3 to 0.5.
     return Finding(
         "R017.apart: both legs of the rig may be in the same leg of the mesh (they are only "
-        "{value:.0%} of the width of the hips apart)",
+        "{value} of the width of the hips apart)",
         min(ratios),
         wrong=0.2,
         good=0.7,

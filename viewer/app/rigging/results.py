@@ -257,6 +257,7 @@ def _no_motion_of(result: Result | None) -> str:
 @shows_errors
 def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
+    state.framing.extent.note_choice()  # the camera may fit other motions, but follows no edits
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
     if clip is not None and clip.kind == "transforms":
@@ -374,7 +375,10 @@ def _draw_question(state: AppState, result: Result) -> None:
     for line in doubts(result.rigged.findings):
         imgui.bullet()
         imgui.text_wrapped(str(line))
-    imgui.text_wrapped("If so, align by landmarks, or choose another template.")
+    imgui.text_wrapped(
+        "If so, align by landmarks, or choose another template: From shape for what is no person "
+        "and no quadruped."
+    )
     if button(state, "Keep it"):
         state.of(Rigging).accepted.append(result.rigged)
     same_line_if_room("Discard it")
