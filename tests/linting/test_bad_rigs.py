@@ -465,16 +465,19 @@ def test_joints_below_one_without_valid_data_are_not_compared():
     assert [*bindings.check(Subject(actor, invalid={"joints": np.array([shoulder])}))] == []
 
 
+def cut_off(vertex: int) -> tuple[Figure, np.ndarray]:
+    """Return the body with a patch around a vertex cut off, and the vertices of the patch."""
+    mesh = body().mesh
+    away = np.linalg.norm(mesh.positions - mesh.positions[vertex], axis=1)
+    inside = np.isin(mesh.triangles, np.flatnonzero(away < 0.03))
+    kept = mesh.triangles[inside.all(axis=1) | ~inside.any(axis=1)]
+    figure = replace(body(), mesh=Mesh(mesh.positions, mesh.normals, kept))
+    return figure, np.unique(mesh.triangles[inside.all(axis=1)])
+
+
 def test_part_that_moves_with_a_distant_joint_is_found():
     """A patch of the head, cut off, moves with a wrist, or with the head."""
-    patch = np.flatnonzero(
-        np.linalg.norm(body().mesh.positions - body().mesh.positions[NOSE], axis=1) < 0.03
-    )
-    mesh = body().mesh
-    inside = np.isin(mesh.triangles, patch)
-    kept = mesh.triangles[inside.all(axis=1) | ~inside.any(axis=1)]
-    cut = replace(body(), mesh=Mesh(mesh.positions, mesh.normals, kept))
-    island = np.unique(mesh.triangles[inside.all(axis=1)])
+    cut, island = cut_off(NOSE)
     for name, expected in (("head", []), ("left_wrist", ["W012.islands"])):
         weights = table().copy()
         weights[island] = np.arange(weights.shape[1]) == joint(name)

@@ -12,6 +12,7 @@ from linting.test_bad_rigs import (
     NOSE,
     body,
     bound_elsewhere,
+    cut_off,
     joint,
     noisy,
     renamed,
@@ -158,6 +159,26 @@ def test_taken_weights_go_back(given):
     figure, note = fixed(taken(*given), stray_weights)
     np.testing.assert_allclose(weights_of(figure), table(), atol=0.01)
     assert "W012 fixed" in note
+
+
+def test_part_that_moved_with_a_distant_joint_moves_as_a_whole():
+    """A patch of the elbow, where weights blend, is cut off, and moves with the other wrist."""
+    sound = table()
+    vertex = int(np.abs(sound[:, joint("left_elbow")] - 0.5).argmin())
+    cut, island = cut_off(vertex)
+    assert np.ptp(sound[island], axis=0).max() > 0.1
+    bad = sound.copy()
+    bad[island] = np.arange(bad.shape[1]) == joint("right_wrist")
+    figure, note = fixed(shaped_by(bad, cut), stray_weights)
+    found = weights_of(figure)
+    assert f"weights of {len(island)} vertices" in note
+    np.testing.assert_allclose(found[island], found[island[:1]].repeat(len(island), 0), atol=1e-12)
+    others = np.setdiff1d(np.arange(len(sound)), island)
+    away = np.linalg.norm(
+        cut.mesh.positions[others, None] - cut.mesh.positions[island], axis=2
+    ).min(axis=1)
+    np.testing.assert_allclose(found[island[0]], sound[others[away.argmin()]], atol=1e-12)
+    np.testing.assert_allclose(found[others], sound[others], atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

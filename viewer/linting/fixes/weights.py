@@ -14,6 +14,7 @@ from viewer.linting._surface import Surface, surface_of
 from viewer.linting.stray_weights import misplaced_weights
 from viewer.phrases import counted, rounded
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.geometry.topology import components
 from viewer.rigs.skin import (
     Skin,
     has_influence,
@@ -123,7 +124,9 @@ def _repaired(subject: Subject, skin: Skin, finding: Finding) -> Skin | None:
             joints[np.isin(keys, taken)] = one.joint
         return replace(skin, joints=joints.astype(np.int32))
     if code == "W012":
-        return _from_nearest(subject, skin, np.unique(misplaced.found.vertices[misplaced.islands]))
+        islands = components(len(surface.place), surface.edges)[surface.place]
+        vertices = np.unique(misplaced.found.vertices[misplaced.islands])
+        return _from_nearest(subject, skin, vertices, islands[vertices])
     # Stray weights are removed; what is left is normalised.
     rows, found = misplaced.strays, misplaced.found
     keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
@@ -151,8 +154,13 @@ def _from_neighbours(subject: Subject, skin: Skin, surface: Surface, vertices: I
     return _from_nearest(subject, skin, vertices)
 
 
-def _from_nearest(subject: Subject, skin: Skin, vertices: Indices) -> Skin:
-    """Give vertices the weights of the nearest vertex that has some and is not one of them."""
+def _from_nearest(
+    subject: Subject, skin: Skin, vertices: Indices, groups: Indices | None = None
+) -> Skin:
+    """Give vertices the weights of the nearest vertex that has some and is not one of them.
+
+    ``groups``: (N,), numbers of those that move together, with the vertex nearest to any of them.
+    """
     if len(vertices) == 0:
         return skin
     points = subject.actor.figure.require_mesh().positions
@@ -162,10 +170,16 @@ def _from_nearest(subject: Subject, skin: Skin, vertices: Indices) -> Skin:
     sources, rows = np.flatnonzero(given), np.arange(skin.n_vertices)
     if len(sources) == 0:
         return skin
+    nearest = np.empty(len(vertices))
     for start in range(0, len(vertices), _TOGETHER):
         some = vertices[start : start + _TOGETHER]
         squares = (points[sources] ** 2).sum(axis=1) - 2.0 * points[some] @ points[sources].T
         rows[some] = sources[squares.argmin(axis=1)]
+        nearest[start : start + _TOGETHER] = squares.min(axis=1) + (points[some] ** 2).sum(axis=1)
+    if groups is not None:  # a rigid part stays rigid
+        order = np.lexsort((nearest, groups))
+        _, first, part = np.unique(groups[order], return_index=True, return_inverse=True)
+        rows[vertices[order]] = rows[vertices[order[first]]][part]
     return skin_rows(skin, rows.astype(np.int32))
 
 
