@@ -270,8 +270,6 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     hand.assert_sane()
 
 
-<<<<<<< HEAD
-=======
 def test_view_holds_the_whole_trial_motion_without_a_press_of_fit(rigging, monkeypatch):
     monkeypatch.setattr(framing, "_POINTS_A_TIME", 0)  # one frame of the motion at a time
     hand = rigging()
@@ -292,22 +290,6 @@ def test_view_holds_the_whole_trial_motion_without_a_press_of_fit(rigging, monke
     assert (places < [x, y]).any() or (places > [x + width, y + height]).any()
 
 
-def test_report_states_how_the_alignment_was_found(rigging, texts):
-    hand = rigging(placed=False)
-    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
-    hand.step(2)
-    hand.click("Align")
-    hand.finish_job()
-    hand.click("Run")
-    hand.finish_job()
-    rigged = hand.state.of(Rigging).results["robust"].rigged
-    keys = ["R001.alignment", "R001.error", "R003.pose", "R003.gap", "R005.matched"]
-    assert [line.key for line in rigged.lines[:5]] == keys
-    assert str(rigged.lines[0].values["how"]) == "found by fitting pose and proportions"
-    assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
-
-
->>>>>>> 0cb158cd (wip)
 def test_rig_that_is_probably_wrong_is_kept_or_discarded(rigging, texts, monkeypatch):
     doubt = Finding("R017.inside: only {value} of the bones are inside the mesh", 0.2, 0.3, 0.7)
     monkeypatch.setattr(work, "judge", lambda *_, **__: (doubt,))
