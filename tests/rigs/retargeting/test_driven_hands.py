@@ -6,18 +6,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from rigs.retargeting.hanging_arms import N, body, motion
-from rigs.retargeting.rest_twins import NAMES, Y, Z, t_pose, worlds, written
+from rigs.retargeting.rest_twins import NAMES, X, Y, Z, t_pose, worlds, written
 from rigs.retargeting.two_people import places
 
 from viewer.rigs.blendshapes import BlendShapes
+from viewer.rigs.geometry.rotation import matrix_to_quaternion
 from viewer.rigs.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
+from viewer.rigs.retargeting.body_parts import Body
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.driven_hands import hand_notes, keep_hands
+from viewer.rigs.retargeting.joint_names import joint_meanings
+from viewer.rigs.retargeting.person_skin import Person
 from viewer.rigs.retargeting.retarget import retarget
 from viewer.rigs.skin import skin_from_lists
 
@@ -86,7 +90,7 @@ def test_hands_away_from_the_body_are_unchanged():
     assert changes is None and clip is found.clip
 
 
-def test_hands_that_clap_meet_in_a_figure_with_long_arms():
+def clapping():
     local = np.tile(np.eye(3), (N, len(NAMES), 1, 1))
     apart = 0.3 + 0.3 * np.cos(np.linspace(0.0, 4.0 * np.pi, N))
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
@@ -94,7 +98,11 @@ def test_hands_that_clap_meet_in_a_figure_with_long_arms():
         local[:, NAMES.index(f"{side}Arm")] = matrices(-sign * 1.3 * Y)
         inwards = -sign * (1.316 - apart)[:, None] * Y
         local[:, NAMES.index(f"{side}ForeArm")] = matrices(inwards)
-    source = written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    return written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+
+
+def test_hands_that_clap_meet_in_a_figure_with_long_arms():
+    source = clapping()
     figure = body(arms=1.6)
     found, clip, _ = kept(figure, source)
 
@@ -112,10 +120,10 @@ def test_hands_that_clap_meet_in_a_figure_with_long_arms():
     assert wrong[0] > 0.12 and wrong[1] < 0.0251
 
 
-def test_hands_on_the_crown_stay_there_in_a_figure_with_long_arms():
-    # Wrists of the source at (8, 186), 41 cm above the shoulders; by the law of cosines for an
-    # upper arm of 28 cm and a forearm of 26.
-    wrist, shoulder = np.array([8.0, 186.0]), np.array([18.0, 145.0])
+def raised(wrist):
+    """Return a motion with both wrists at a place, (2,), beside and above the head."""
+    # By the law of cosines for an upper arm of 28 cm and a forearm of 26.
+    shoulder = np.array([18.0, 145.0])
     line = wrist - shoulder
     length = np.linalg.norm(line)
     cosine = (28.0**2 + length**2 - 26.0**2) / (2.0 * 28.0 * length)
@@ -126,7 +134,13 @@ def test_hands_on_the_crown_stay_there_in_a_figure_with_long_arms():
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         local[:, NAMES.index(f"{side}Arm")] = matrices(sign * upper * Z)
         local[:, NAMES.index(f"{side}ForeArm")] = matrices(sign * lower * Z)
-    source = written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+    return written(t_pose(), worlds(local), np.zeros((N, 3)), rate=30.0)
+
+
+def test_hands_on_the_crown_stay_there_in_a_figure_with_long_arms():
+    # 41 cm above the shoulders.
+    wrist = np.array([8.0, 186.0])
+    length, source = np.linalg.norm(wrist - [18.0, 145.0]), raised(wrist)
     figure = body(arms=1.4)
     found, clip, _ = kept(figure, source)
     before, after = (places(figure, each)["LeftHand_"][:, :2] for each in (found.clip, clip))
@@ -157,27 +171,28 @@ def sheets(distance):
     return corners, np.concatenate([faces, faces[:, ::-1] + 4])
 
 
-def clothed(corners, trunk_faces):
-    """Return a person with a skin around the trunk, and octahedra around the wrists as hands."""
-    figure = body(width=1.5)
+def octahedron(radius):
+    """Return corners and faces."""
+    signs = [(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)]
+    # Counter-clockwise from outside: an even number of negative corners keeps x, y, z in order.
+    faces = [f if sum(k > 2 for k in f) % 2 == 0 else f[::-1] for f in signs]
+    return radius * np.concatenate([np.eye(3), -np.eye(3)]), np.array(faces)
+
+
+def clothed(corners, faces, joint="Hips_", figure=None):
+    """Return a person with a skin at the hips or another joint, and octahedra as hands."""
+    figure = figure or body(width=1.5)
     names, at = list(figure.skeleton.names), places_at_rest(figure)
-    points, triangles, rows = [], [], []
-
-    def add(joint, corners, faces):
-        triangles.append(np.array(faces) + sum(map(len, points)))
-        points.append(corners)
-        rows.extend([[(names.index(joint), 1.0)]] * len(corners))
-
-    add("Hips_", corners, trunk_faces)
+    parts = [(joint, corners, faces)]
     for side in ("Left", "Right"):
-        tips = TIP * np.concatenate([np.eye(3), -np.eye(3)]) + at[f"{side}Hand_"]
-        signs = [(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)]
-        # Counter-clockwise from outside: an even number of negative corners keeps x, y, z in order.
-        faces = [f if sum(k > 2 for k in f) % 2 == 0 else f[::-1] for f in signs]
-        add(f"{side}Hand_", tips, faces)
+        tips, signs = octahedron(TIP)
+        parts.append((f"{side}Hand_", tips + at[f"{side}Hand_"], signs))
+    counts = np.cumsum([0, *(len(points) for _, points, _ in parts)])
+    positions = np.concatenate([points for _, points, _ in parts])
+    triangles = [each + start for (_, _, each), start in zip(parts, counts, strict=False)]
+    rows = [[(names.index(name), 1.0)] for name, points, _ in parts for _ in points]
     bind = np.tile(np.eye(4), (len(names), 1, 1))
     bind[:, :3, 3] = -np.array([at[name] for name in names])
-    positions = np.concatenate(points)
     mesh = Mesh(positions, 0.0 * positions, np.concatenate(triangles).astype(np.int32))
     return replace(figure, mesh=mesh, skin=skin_from_lists(rows, bind))
 
@@ -244,6 +259,78 @@ def test_hands_that_touch_the_trunk_come_to_the_skin_of_a_slim_one(radius, rate)
         before, after = (from_trunk(slim, each, side)[touching] for each in (found.clip, clip))
         assert before.min() - radius > 0.09 * HEIGHT
         assert np.abs(after - radius).max() < 0.03 * HEIGHT
+
+
+@pytest.mark.parametrize("radius", [6.0, 9.0])
+def test_hands_with_a_skin_clap_without_going_through_each_other(radius):
+    source, figure = clapping(), clothed(*tube(radius), figure=body(arms=1.6))
+    found = retarget(source, figure, source_rest="auto")
+    clip, _ = keep_hands(found, found.clip, figure)
+    theirs, before, after = (
+        places(each, motion)[f"LeftHand{end}"][:, 0] - places(each, motion)[f"RightHand{end}"][:, 0]
+        for each, motion, end in (
+            (source.figure, source.clip, ""), (figure, found.clip, "_"), (figure, clip, "_"),
+        )
+    )  # fmt: skip
+    met = theirs < 0.06 * HEIGHT
+    # Wrists that are crossed by 11 cm come back. Hands touch where wrists are two octahedra apart.
+    assert before[met].max() < -8.0
+    assert np.abs(after[met] - 2.0 * TIP).max() < 0.03 * HEIGHT and after.min() > 0.0
+
+
+@pytest.mark.parametrize("radius", [22.0, 30.0])
+def test_hands_on_the_crown_come_to_the_skin_of_a_head(radius):
+    source, figure = raised(np.array([8.0, 186.0])), body(arms=1.4)
+    corners, faces = octahedron(radius)
+    head = places_at_rest(figure)["Head_"]
+    figure = clothed(head + corners, faces, "Head_", figure)
+    found = retarget(source, figure, source_rest="auto")
+    clip, _ = keep_hands(found, found.clip, figure)
+    for side in ("Left", "Right"):
+        # The faces of an octahedron are |x| + |y| + |z| = r, at r / sqrt(3) from its middle; those
+        # of a hand are as much nearer than its wrist.
+        before, after = (
+            (np.abs(where[f"{side}Hand_"] - where["Head_"]).sum(axis=1) - radius - TIP) / 3.0**0.5
+            for where in (places(figure, each) for each in (found.clip, clip))
+        )
+        assert before.min() > 0.06 * HEIGHT and np.abs(after).max() < 0.03 * HEIGHT
+
+
+def test_hand_touches_armour_that_stands_off_the_body():
+    # A plate 3 cm thick before the left third of the trunk has an outer and an inner face. The left
+    # hand comes to the outer one, the right hand to the trunk.
+    trunk, faces = tube(6.0)
+    plate = faces[np.isin(faces % 24, [*range(20, 24), *range(5)]).all(axis=1)]
+    outer, inner = tube(14.0)[0], tube(11.0)[0]
+    corners = np.concatenate([trunk, outer, inner])
+    every = np.concatenate([faces, plate + 48, plate[:, ::-1] + 96])
+    figure, source = clothed(corners, every), comes_to_the_trunk()
+    found = retarget(source, figure, source_rest="auto")
+    clip, _ = keep_hands(found, found.clip, figure)
+    for side, radius in (("Left", 14.0), ("Right", 6.0)):
+        touching = from_trunk(figure, clip, side)[26:34]
+        assert np.abs(touching - radius).max() < 0.03 * HEIGHT
+
+
+@pytest.mark.parametrize(("turn", "along", "across"), [(-1, 0.065, 0.052), (1, 0.05, 0.025)])
+def test_thumb_is_the_first_part_of_a_hand_to_touch_a_thigh(turn, along, across):
+    # A straight left arm hangs at x = 36 from 145 cm, with the wrist at 91 cm, beside a thigh at
+    # x = 20 from 95 to 50 cm. Thumbs point forwards at rest; a quarter of a turn points them at the
+    # thigh, or away from it.
+    skeleton = body(width=2.0).require_skeleton()
+    local = np.tile(np.eye(3), (1, len(NAMES), 1, 1))
+    local[:, NAMES.index("LeftArm")] = matrices(-0.5 * np.pi * Z)
+    local[:, NAMES.index("LeftHand")] = matrices(-turn * 0.5 * np.pi * X)
+    clip = SampledClip("", Timing(30.0, np.zeros(1, dtype=np.int32)), matrix_to_quaternion(local))
+    joints = {name: j for j, name in enumerate(joint_meanings(skeleton)) if name}
+    rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
+    tips = [joints["right_wrist"], joints["left_wrist"]]
+    person = Person(Body(skeleton, clip, joints, rests, tips), tips)
+    # The nearest point of the hand, 1.3 % of the height thick; the thigh, 8.2 % thick at the hip
+    # and 4.5 % at the knee.
+    part = (95.0 - 91.0 + along * HEIGHT) / 45.0
+    thigh = 0.082 + part * (0.045 - 0.082)
+    assert_allclose(person.hand[1], 16.0 / HEIGHT - across - thigh - 0.013, atol=1e-3)
 
 
 def test_hands_of_long_arms_come_to_the_body_without_a_jerk():

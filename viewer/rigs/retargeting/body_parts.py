@@ -11,7 +11,7 @@ import numpy as np
 from viewer.rigs.arrays import Floats
 from viewer.rigs.feet.body import chain_worlds, chains_to, rest_worlds
 from viewer.rigs.feet.curves import falling
-from viewer.rigs.geometry.vectors import unit
+from viewer.rigs.geometry.vectors import lengths_of, unit
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.skeleton import Skeleton
 
@@ -81,6 +81,10 @@ class Body:
         found = world[:, :3, 3] if name != "crown" else world[:, :3] @ np.append(self._crown, 1.0)
         return found / self.height
 
+    def between_wrists(self) -> Floats:
+        """Return the second wrist of ``ARMS`` relative to the first: (N, 3)."""
+        return self.at(ARMS[1][2]) - self.at(ARMS[0][2])
+
 
 def bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
     """Yield the bones between those joints of the parts that are matched."""
@@ -104,8 +108,7 @@ def from_bone(body: Body, wrist: str, start: str, end: str) -> tuple[Floats, Flo
 
 def together_in(other: Body) -> Floats:
     """Return how near the wrists are to each other, (N,): 1 where they touch, 0 where far."""
-    between = other.at(ARMS[1][2]) - other.at(ARMS[0][2])
-    return falling((np.linalg.norm(between, axis=1) - _TOGETHER) / (_APART - _TOGETHER))
+    return falling((lengths_of(other.between_wrists()) - _TOGETHER) / (_APART - _TOGETHER))
 
 
 def within_reach(body: Body, arm: tuple[str, ...], shift: Floats) -> Floats:

@@ -248,10 +248,9 @@ def _shifts(
         shifts.append((most / np.maximum(weights, 1e-30))[:, None] * total)
         nearness.append(most)
     # Hands that touch each other move by half of the difference each.
-    ends = [body.at(arm[2]) + shift for arm, shift in zip(ARMS, shifts, strict=True)]
-    between = (other.at(ARMS[1][2]) - other.at(ARMS[0][2])) @ to_target.T
     weight = together_in(other)
-    half = 0.5 * weight[:, None] * (between - (ends[1] - ends[0]))
+    between = other.between_wrists() @ to_target.T
+    half = 0.5 * weight[:, None] * (between - (body.between_wrists() + shifts[1] - shifts[0]))
     shifts = [shifts[0] - half, shifts[1] + half]
     return shifts, [np.maximum(near, weight) for near in nearness], weight
 

@@ -58,7 +58,11 @@ def shifts_at_skin(
     ``shifts``: (2, N, 3), those that are known without the skin.
     """
     aims = _aims(body, solid, other, person, to_target, shifts)
-    sides = np.stack([_side(other, number) @ to_target.T for number in range(len(ARMS))])
+    # Ways out: from the trunk, and from the other forearm and hand where the hands touch.
+    apart, together = other.between_wrists() @ to_target.T, together_in(other)
+    across = np.where(together[:, None] > 0.0, unit(apart), 0.0)
+    trunk = [_side(other, number) @ to_target.T for number in range(len(ARMS))]
+    sides = np.stack([trunk, [-across, across]], axis=2)
     # Free rows pull the curve to 0 with a weight of 1, rows at the skin to their targets, so that
     # waves longer than _STEADY pass. It also goes through rows between those that are placed.
     pulls = (_FADE / _STEADY) ** 4 * person.holds**_POWER
@@ -91,6 +95,12 @@ def shifts_at_skin(
             wished = part[:, None] * (result[number, rows] + step)
             targets[number, rows] = (1.0 - part)[:, None] * targets[number, rows] + wished
             farthest = max(farthest, float((part * length).max()))
+        # Hands that went through each other do not touch any more: they go back, at once.
+        found = body.between_wrists() + result[1] - result[0]
+        is_crossed = is_placed & (np.einsum("na,na->n", found, apart) < 0.0)
+        half = np.where(is_crossed, 0.5 * together, 0.0)[:, None] * (apart - found)
+        targets += np.stack([-half, half])
+        farthest = max(farthest, float(lengths_of(half).max()))
         if farthest < NONE:
             break
         result = _faded(body, targets, pulls, timing)
@@ -122,9 +132,8 @@ def _aims(
                 weights += weight**2
         result[number] = total / weights[:, None]
     # Hands that touch each other move by half of the difference each.
-    first, second = (body.at(arm[2]) + shift for arm, shift in zip(ARMS, result, strict=True))
-    between = (other.at(ARMS[1][2]) - other.at(ARMS[0][2])) @ to_target.T
-    half = 0.5 * together_in(other)[:, None] * (between - (second - first))
+    found = body.between_wrists() + result[1] - result[0]
+    half = 0.5 * together_in(other)[:, None] * (other.between_wrists() @ to_target.T - found)
     return result + np.stack([-half, half])
 
 
@@ -292,12 +301,14 @@ def _steps(
     near = falling((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))
     pull = -(near * excess)[:, None] * unit(away[each, first])
     # The mean direction out, on the side of the part on which the hand is.
-    ways = np.where((parts[each[:, None], nearest] < 0)[..., None], sides[number, rows, None], 0.0)
+    part = parts[each[:, None], nearest][..., None]
+    trunk, hand = (sides[number, rows, None, which] for which in (0, 1))
+    ways = np.where(part < 0, trunk, np.where(part > 0, hand, 0.0))
     inwards = np.minimum(np.einsum("rha,rha->rh", outward, ways), 0.0)
     way = unit(np.einsum("rh,rha->ra", missing, outward - inwards[..., None] * ways))
     cosine = np.maximum(np.einsum("ra,ra->r", way, outward[each, first]), 0.5)
     push = np.minimum(missing[each, first] / cosine, _FAST)[:, None] * way
     # Of two hands, each gives way by half.
-    give = np.where(parts[each, nearest[each, first]] == 2, 0.5, 1.0)
+    give = np.where(part[each, first, 0] == 2, 0.5, 1.0)
     step = give[:, None] * np.where((missing[each, first] > 0.0)[:, None], push, pull)
     return arms.within_reach(number, rows, step)
