@@ -210,6 +210,22 @@ def test_corners_of_a_cape_are_no_legs(standing):
     assert found.lower is plan.lower
 
 
+def test_thick_legs_that_touch_begin_at_the_crotch():
+    positions, triangles = person()
+    # Below y = 0.14, there is a gap of 0.1 between the legs.
+    thick, more = mesh(*both((0.1, 0.25, 0, 0.11), (0.1, 0.6, 0, 0.11)))
+    triangles = np.concatenate([triangles, len(positions) + more])
+    anatomy = anatomy_of(np.concatenate([positions, thick]), triangles, UP, np.array([1.0, 0, 0]))
+    assert min(pair.attachment[1] for pair in anatomy.pairs) < 0.3
+    (plan,) = plans_of(anatomy, False, AHEAD)
+    # The trunk, a ball of 0.12 at y = 0.65, is 0.75 times as deep as the legs at a height of
+    # 0.65 - sqrt(0.12^2 - (0.75 * 0.11)^2) = 0.56.
+    np.testing.assert_allclose(plan.lower.attachment, [0, 0.56, 0], atol=0.03)
+    for limb in plan.lower.limbs:
+        thighs = limb.points[(limb.points[:, 1] > 0.3) & (limb.points[:, 1] < 0.5)]
+        np.testing.assert_allclose(np.abs(thighs[:, 0]), 0.1, atol=0.03)
+
+
 def test_legs_may_be_less_than_half_as_long_as_arms_that_reach_the_ground(standing):
     (plan,) = plans_of(standing, False, AHEAD)
     points = np.array([[1.2, 0.05, 0], [0.2, 1.0, 0], [0.0, 1.0, 0]])

@@ -14,6 +14,8 @@ Found in the voxels of its solid, given only the up axis:
   mirror image of the longer arm is inside the solid, it is the other arm.
 - A limb's axis is the path from its tip to the plane that prefers voxels far from the surface. Its
   junction with the trunk is where the radius exceeds the smallest one of the upper limb by half.
+- Legs that touch each other seem to part far below the crotch: they go on upwards as long as there
+  is a groove between them.
 - The neck is where the radius along the path to the top of the head is smallest between two wider
   parts; the head is the widest place beyond it.
 
@@ -64,6 +66,9 @@ _WIDER = 1.5  # ratio of radii at the junction with the trunk
 _STRAIGHT = (0.6, 0.8)
 _BENDS = np.cos(np.radians(35.0))  # a path that bends more behind that part has left the arm
 _DEEP = 0.75  # depth of a shoulder joint as a fraction of the upper arm's radius
+# Depth of a section of touching legs between them over that in their middle: round legs that just
+# touch have 0, a trunk has about 1; the cleft of buttocks is hardly a tenth of their depth.
+_GROOVE = 0.75
 _ON_GROUND = 0.12  # height of the tip of a leg, as a fraction of the figure's height
 
 _ARM = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)  # fractions of the path from tip to junction
@@ -426,6 +431,7 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
     # The corners of a cape or a coat that reach the ground lead sideways, not up.
     lowest = [pair for pair in standing if anatomy.rise(pair) >= _UPWARDS] or anatomy.pairs
     legs = min(lowest, key=lambda pair: heights[id(pair)])
+    lower = _up_to_crotch(anatomy, legs)
     above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair) and not pair.is_bump]
     longest = max((pair.length for pair in above), default=0.0)
     # Ears, horns and capes are shorter than arms, or are attached above them.
@@ -436,8 +442,52 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
     for pair in sorted(arms, key=lambda pair: heights[id(pair)])[:_MOST_ARMS]:
         for left in (anatomy.lateral, -anatomy.lateral):
             if front is None or float(np.cross(left, anatomy.up) @ front) > 0.0:
-                found.append(Plan(legs, pair, left))
+                found.append(Plan(lower, pair, left))
     return found
+
+
+def _up_to_crotch(anatomy: Anatomy, pair: LimbPair) -> LimbPair:
+    """Return legs, those that touch each other above their fork up to where the groove ends.
+
+    Wide trousers and thick legs leave a gap only above the feet, but sections above it are those of
+    two legs: between them, they are less deep than in the middle of each.
+    """
+    from scipy import ndimage
+
+    solid, up, step = anatomy.solid, anatomy.up, anatomy.solid.spacing
+    centers = solid.centers(solid.voxels)
+    heights, sides = centers @ up, centers @ anatomy.lateral - anatomy.offset
+    fork = float(pair.attachment @ up)
+    apart = [np.abs(limb.points @ anatomy.lateral - anatomy.offset) for limb in pair.limbs]
+    axis = float(np.mean([np.median(each) for each in apart]))
+    near = (np.abs(sides) <= 2.0 * axis) & (heights >= fork)
+    if not near.any():
+        return pair
+    # Layers and columns of voxels, counted from one of them: it is in the middle of its own.
+    levels = np.rint((heights - heights[near].min()) / step).astype(np.int64)
+    columns = np.rint((sides - sides[near].min()) / step).astype(np.int64)
+    depths = np.zeros((levels[near].max() + 1, columns[near].max() + 1))
+    np.add.at(depths, (levels[near], columns[near]), 1.0)
+    depths = ndimage.uniform_filter1d(depths, 3, axis=1, mode="constant")
+    middle = int(np.clip(np.rint(-sides[near].min() / step), 1, depths.shape[1] - 2))
+    each = np.minimum(depths[:, :middle].max(axis=1), depths[:, middle + 1 :].max(axis=1))
+    merged = np.flatnonzero((depths[:, middle] > 0.0) & (depths[:, middle] >= _GROOVE * each))
+    top = int(merged[0]) if len(merged) else 0
+    # The arch of a crotch is as high as half of the distance of its legs.
+    if top * step <= axis:
+        return pair
+    limbs = []
+    attachment = centers[near & (levels == top) & (np.abs(sides) <= 2.0 * step)].mean(axis=0)
+    for limb in pair.limbs:
+        is_own = near & (sides * float((limb.points[0] @ anatomy.lateral) - anatomy.offset) > 0.0)
+        above = [centers[is_own & (levels == level)].mean(axis=0) for level in range(top)]
+        # The path turns to the plane below the fork; the leg goes on.
+        kept = limb.points @ up <= fork - axis
+        rows = solid.nearest(np.stack([*above, attachment]))
+        points = np.concatenate([limb.points[kept], centers[rows]])
+        radii = np.concatenate([limb.radii[kept], anatomy.paths.radii[rows]])
+        limbs.append(Limb(points, radii, attachment, limb.length + top * step))
+    return LimbPair((limbs[0], limbs[1]))
 
 
 def _rises(anatomy: Anatomy, legs: LimbPair, pair: LimbPair) -> bool:
