@@ -258,12 +258,18 @@ def test_skeleton_with_its_root_at_the_origin_is_moved_into_the_mesh():
     assert_allclose(rigged.figure.skeleton.rest_translations[0], [3, 6, 0], atol=2.0 / 96)
 
 
-@pytest.mark.parametrize(("half", "warned"), [(1.0, False), (0.9, True)])
-def test_skeleton_with_a_margin_is_said_to_be_too_small(half, warned):
-    # As of a network that scales the mesh to 2, or to 1.8: joints at 5 % and 97.5 % of a bar.
+@pytest.mark.parametrize(
+    ("unit", "half", "warned"),
+    [("", 1.0, False), ("", 0.9, True), ("cm", 100.0, False), ("cm", 90.0, True)],
+)
+def test_skeleton_with_a_margin_is_said_to_be_too_small(unit, half, warned):
+    # As of a network that scales the mesh to 2, or to 1.8: joints at 5 % and 97.5 % of a bar. In a
+    # .fbx file of Blender, these are metres, stored as centimetres.
     bar = mesh_of(*box((20, -1, -1), (40, 1, 1), (20, 2, 2)))
     root, middle, tip = ((half * x, 0.0, 0.0) for x in (-0.9, 0.0, 0.95))
-    rigged = bound(skeleton_of({"a": ("", root), "b": ("a", middle), "c": ("b", tip)}), bar)
+    bare = skeleton_of({"a": ("", root), "b": ("a", middle), "c": ("b", tip)})
+    rigged = bound(replace(bare, unit=unit), bar)
+    assert f"scale {0.1 if unit else 10}," in str(rigged.lines[0])
     said = [line for line in rigged.lines if "may be too small" in str(line)]
     assert [line.code for line in said] == ["R002"] * warned
 

@@ -66,7 +66,9 @@ _UNITS = (1.0, *sorted({a / b for a, b in product(METRES.values(), repeat=2) if 
 # from the best up to which places are alike.
 _SLID, _ALIKE = 0.85, 0.1
 _TELLING = 0.5  # fraction of joints with weights from which the others are known to be idle
-# Networks that predict skeletons scale the longest side of a mesh to 2, centred, or to 1.
+# Networks that predict skeletons scale the longest side of a mesh to 2, centred, or to 1. Programs
+# that store lengths in another unit take these for metres: in a .fbx file of Blender, they are 200
+# and 100.
 _NORMALISED = (2.0, 1.0)
 # Some leave a margin, so that the skeleton is placed too small. Of artists' skeletons of 16 meshes,
 # at most 0.93 of what is inside stays there if they are made this much larger; of the same ones
@@ -126,7 +128,7 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
     out = tuple(np.flatnonzero(bones.outside).tolist())
     lines = (
         placed,
-        *_size_lines(skeleton, joints, moved, solid),
+        *_size_lines(source, skeleton, joints, moved, solid),
         *_weight_lines(mesh, found, how.method),
         *(with_joint_name(line, figure) for line in rigid_lines(weights.rigid, from_bones=True)),
         *_bone_lines(skeleton, bones, skin),
@@ -268,17 +270,28 @@ def _candidates(source: Figure, solid: Solid, how: AlignmentSettings) -> list[Si
         ]
     else:
         rotations = axis_rotations(source.up, how.up, how.facing)
-    centers = solid.centers(solid.voxels)
-    low, high = centers.min(axis=0), centers.max(axis=0)
-    middle, longest = 0.5 * (low + high), float((high - low).max())
+    middle, longest = _box(solid)
     places = [(unit, np.zeros(3)) for unit in (_UNITS if how.scale != "none" else (1.0,))]
     if how.scale != "none":
-        places += [(longest / side, middle) for side in _NORMALISED]
+        places += [(longest / side, middle) for side in _normalised_sides(source)]
     return [
         Similarity(scale, rotation, shift, np.ones(3))
         for scale, shift in places
         for rotation in rotations
     ]
+
+
+def _box(solid: Solid) -> tuple[Floats, float]:
+    """Return the middle (3,) of a solid's box and its longest side, both to half a voxel."""
+    centers = solid.centers(solid.voxels)
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    return 0.5 * (low + high), float((high - low).max()) + solid.spacing
+
+
+def _normalised_sides(source: Figure) -> list[float]:
+    """Return the longest sides of the meshes for which networks predict skeletons."""
+    units = sorted({1.0, METRES.get(source.unit, 1.0)}, reverse=True)
+    return [side / unit for unit in units for side in _NORMALISED]
 
 
 def _slid(solid: Solid, points: Floats, place: Similarity) -> Similarity:
@@ -312,8 +325,7 @@ def _counts_inside(solid: Solid, points: Floats, places: list[Similarity]) -> li
 
 def _ratio(points: Floats, solid: Solid) -> float:
     """Return the longest side of the joints' box over that of the mesh's."""
-    mesh = float(np.ptp(solid.voxels, axis=0).max() + 1) * solid.spacing
-    return float(np.ptp(points, axis=0).max()) / mesh
+    return float(np.ptp(points, axis=0).max()) / _box(solid)[1]
 
 
 def _placed_line(found: Similarity, inside: int, count: int, before: int | None) -> Diagnostic:
@@ -344,13 +356,11 @@ def _placed_line(found: Similarity, inside: int, count: int, before: int | None)
 
 
 def _size_lines(
-    skeleton: Skeleton, joints: Floats, place: Similarity, solid: Solid
+    source: Figure, skeleton: Skeleton, joints: Floats, place: Similarity, solid: Solid
 ) -> Iterator[Diagnostic]:
     """Yield a warning if a skeleton that was scaled to the mesh's size may be too small."""
-    centers = solid.centers(solid.voxels)
-    low, high = centers.min(axis=0), centers.max(axis=0)
-    middle, longest = 0.5 * (low + high), float((high - low).max())
-    if not any(np.isclose(place.scale * side, longest) for side in _NORMALISED):
+    middle, longest = _box(solid)
+    if not any(np.isclose(place.scale * side, longest) for side in _normalised_sides(source)):
         return
     ends = np.flatnonzero(skeleton.parents >= 0)
     bones = np.linspace(joints[skeleton.parents[ends]], joints[ends], _BONE_SAMPLES)
