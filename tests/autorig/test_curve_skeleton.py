@@ -541,6 +541,7 @@ def test_corners_of_a_cut_are_no_limbs():
         _widths=np.array([0.1, 0.1]), _least=0.05, cuts=np.array([[1.0, 0, 0]]),
         _cut_widths=[0.2], _middles=np.array([[0.9, 0, 0], [3.0, 0, 0]]),
     )  # fmt: skip
+    near._is_distinct = lambda found: False
     near._is_at_cut = lambda found: limb_tree._Field._is_at_cut(near, found)
     assert not limb_tree._Field._is_limb(near, Protrusion(0, 1.0, 0.8, (0,), ()))
     # Neither is one that begins elsewhere, nor a longer one, a corner.
@@ -549,14 +550,20 @@ def test_corners_of_a_cut_are_no_limbs():
 
 
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
-    field = SimpleNamespace(_widths=np.array([0.1, 2.0]), _least=0.05)
-    assert limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.6, (0,)),)))
-    # The corner of a fan, as a bird's tail, is no limb.
-    assert not limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ((0.75, (0,)),)))
-    assert not limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), ()))
+    def is_distinct(depth, *necks):
+        """Return whether a protrusion up to 1 is, with necks 0.1 wide at these distances."""
+        field = SimpleNamespace(_widths=np.array([0.1]), _depths=np.array([depth]))
+        found = Protrusion(0, 1.0, 0.5, (1,), tuple((neck, (0,)) for neck in necks))
+        return limb_tree._Field._is_distinct(field, found)
+
+    assert is_distinct(0.02, 0.6)
+    # The corner of a fan, as a bird's tail, is no limb; a thumb as long is one.
+    assert not is_distinct(0.02, 0.75)
+    assert is_distinct(0.06, 0.75)
+    assert not is_distinct(0.06, 0.85)
+    assert not is_distinct(0.06)
     # A leg that met a corner of its own foot first is one all the same.
-    met = (0.75, (0,)), (0.6, (0,))
-    assert limb_tree._Field._is_limb(field, Protrusion(0, 1.0, 0.5, (1,), met))
+    assert is_distinct(0.02, 0.75, 0.6)
 
 
 def test_shapes_without_limbs_get_one_joint_and_a_warning(monkeypatch):

@@ -142,8 +142,10 @@ class LevelSets:
     def __init__(self, steps: csr_array, distances: Floats, spacing: float) -> None:
         from scipy.sparse import coo_array, csgraph
 
-        self._distances, self._thickness = distances, _BAND * spacing
-        bands = (distances / self._thickness).astype(np.int64)
+        self._distances = distances
+        self.thickness = _BAND * spacing
+        """Difference of the distances in a level set."""
+        bands = (distances / self.thickness).astype(np.int64)
         links = steps.tocoo()
         same = bands[links.row] == bands[links.col]
         level = coo_array(
@@ -189,7 +191,7 @@ class LevelSets:
             base_of = {tip: tuple(base) for one, base in bases.items() for tip in kept[one]}
             tips = sorted(base_of, key=lambda tip: float(self._farthest[tip]))
             if tips:
-                junction = self._thickness * float(self._band[node])
+                junction = self.thickness * float(self._band[node])
                 passed = [
                     tip
                     for tip in tips
@@ -250,7 +252,7 @@ class LevelSets:
                 if sides is None:
                     continue
                 around = [*sides[0], *sides[1]]
-                height = self._thickness * float(self._band[high] - self._band[around].min())
+                height = self.thickness * float(self._band[high] - self._band[around].min())
                 if height <= _LOOP * max(float(np.median(widths[around])), least):
                     continue
                 if self._are_joined(*sides):

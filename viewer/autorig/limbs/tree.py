@@ -34,7 +34,10 @@ PLATE = 4.0
 # Shortest limb: relative to the half width of its base, to the size, and in voxels. A bump is
 # wider than long.
 _OWN, _SHORTEST, _VOXELS = 1.0, 0.03, 3.0
-_LONG = 3.0  # length of a limb relative to its neck, from which it is one wherever it is
+# Length of a limb relative to the half width of its neck, from which it is one wherever it is; and
+# that of a limb with a round neck, up to twice as wide as thick, whose radius is at least this
+# fraction of the half width: a thumb is one where the corner of a bird's tail is none.
+_LONG, _STOUT, _ROUND = 3.0, 2.0, 0.5
 # A hub's reach relative to the solid's radius there: two branches that touch the same inscribed
 # ball are one.
 _REACH = 1.0
@@ -155,6 +158,8 @@ class _Field:
             self.cuts = np.concatenate([self.cuts, self.centers[ends].mean(axis=0)[None]])
             self._cut_widths.append(float(self._widths[np.concatenate(loop)].max()))
         self._middles = self._levels.middles(self.centers)
+        self._depths = np.zeros(self._levels.count)
+        np.maximum.at(self._depths, self._levels.labels, self.radii)
         self.tips = self._levels.tips(lambda found: self._is_limb(found) or self._is_wanted(found))
         routes = [route[::-1] for route in paths.to(np.array([source]), self.tips.rows)]
         stands = [k for k, route in enumerate(routes) if self._stands(k, route[::-1])]
@@ -165,14 +170,22 @@ class _Field:
         """Paths to the tips of limbs, by the index of the tip."""
 
     def _is_limb(self, found: Protrusion) -> bool:
-        # On a plate, as a leg of a table, the base of a later junction is a part of the plate. The
-        # first junction may be with a bump of the limb itself, such as a corner of its foot.
-        for junction, base in found.necks:
-            if found.tip - junction >= _LONG * float(self._widths[list(base)].max()):
-                return True
+        if self._is_distinct(found):
+            return True
         width = float(self._widths[list(found.base)].max())
         is_long = found.tip - found.junction >= max(_OWN * width, self._least)
         return is_long and not self._is_at_cut(found)
+
+    def _is_distinct(self, found: Protrusion) -> bool:
+        """Return whether a protrusion is clearly longer than its neck at an earlier junction."""
+        # On a plate, as a leg of a table, the base of a later junction is a part of the plate. The
+        # first junction may be with a bump of the limb itself, such as a corner of its foot.
+        for junction, base in found.necks:
+            width = float(self._widths[list(base)].max())
+            is_round = float(self._depths[list(base)].max()) >= _ROUND * width
+            if found.tip - junction >= (_STOUT if is_round else _LONG) * width:
+                return True
+        return False
 
     def _is_wanted(self, found: Protrusion) -> bool:
         """Return whether a protrusion ends where a limb is expected, and is more than a bump."""
@@ -199,7 +212,8 @@ class _Field:
             return True
         # That may be inside of the trunk. The rim around a foot met the arm on it before.
         parted = max((at for at, those in self.tips.meetings if tip in those), default=0.0)
-        return bool(self.tips.stood_out[tip]) and parted > half
+        # A level set reaches farther than the distance at which it begins.
+        return bool(self.tips.stood_out[tip]) and parted + self._levels.thickness > half
 
     @property
     def levels(self) -> Ints:
