@@ -306,19 +306,21 @@ def _matches(state: AppState) -> list[_Unsaved]:
 
 def _rigs(state: AppState) -> list[_Unsaved]:
     """Return edited rigs and the one of the Rig panel; the other method's is an alternative."""
-    saved = state.of(SavedWork)
+    saved, loader = state.of(SavedWork), state.of(Files).loader
+    # A rig that the motions of new files drive is not lost.
+    kept = None if loader is None or state.of(Closing).is_requested else loader.rig
     found = [
         _Unsaved(
             f"{printable(actor.name, _LONGEST)}: rig",
             _for_actor(row, ask_for_export),
         )
         for row, actor in enumerate(state.scene.actors)
-        if actor.figure in saved.edited and actor.figure not in saved
+        if actor.figure in saved.edited and actor.figure not in saved and actor.figure is not kept
     ]
     if state.of(Rigging).scene is not state.scene:
         return found
     result = shown_result(state)
-    if result is None or result in saved:
+    if result is None or result in saved or result.rigged.figure is kept:
         return found
     text = f"{printable(result.target.name, _LONGEST)}: rig"
     return [*found, _Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]

@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.app.closing import unsaved_edits
 from viewer.app.core.view_frame import view_frame
-from viewer.app.files.files import Files
 from viewer.app.posing.posing import save_export
 from viewer.app.rigging.joint_editing.state import JointEditing
 from viewer.app.rigging.rigging import Rigging
@@ -420,7 +419,7 @@ def test_own_joints_of_a_bound_figure_keep_their_weights(drive):
     assert hand.state.scene.actors[1].figure is other
 
 
-def test_motion_that_is_opened_drives_the_rig_that_the_question_has_saved(drive, tmp_path):
+def test_motions_that_are_opened_drive_the_edited_rig(drive, tmp_path):
     hand = opened(drive, arm(), start="own")
     hand.state.of(JointEditing).choices.weights = "keep"
     frame, center = view_frame(hand.state), rest_worlds(arm())[1, :3, 3]
@@ -428,14 +427,18 @@ def test_motion_that_is_opened_drives_the_rig_that_the_question_has_saved(drive,
     hand.step(2)
     edited, motion = figure(hand), tmp_path / "nod.bvh"
     motion.write_text(NOD)
-    hand.open(motion)
-    hand.click("Save…")
-    save = hand.state.of(Files).dialog.done
-    hand.state.of(Files).dialog = None
-    save(hand.state, [tmp_path / "arm.glb"])
+    # No file contains the rig: it is not lost, so no question is asked, until the window is closed.
+    for _ in range(2):
+        before = hand.state.scene
+        hand.open(motion)
+        (actor,) = hand.state.scene.actors
+        assert hand.state.scene is not before
+        assert actor.drive is not None and actor.figure is edited
+        assert [one.text for one in unsaved_edits(hand.state)] == ["arm: rig"]
+    save_export(hand.state, tmp_path / "arm.glb")
     hand.finish_job()
-    hand.wait_for_loader()
-    hand.step(2)
+    assert unsaved_edits(hand.state) == []
+    hand.open(motion)
     (actor,) = hand.state.scene.actors
     assert hand.state.paths == (tmp_path / "arm.glb", motion) and actor.drive is not None
     assert_allclose(rest_worlds(actor.figure), rest_worlds(edited), atol=1e-6)

@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.app.core import framing
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.view_frame import view_frame
 from viewer.app.files.files import Files
 from viewer.app.layout import ShownPanels
@@ -253,6 +254,7 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     assert visible(hand) == ["scan rigged", "arm"]
     assert hand.state.actor.figure.is_attached and hand.state.chosen_actor == 0
     assert hand.undo_steps == steps + 1
+    assert hand.state.of(SavedWork).lacks_rig(hand.state.actor.figure)  # motions drive it
     assert hand.state.clock.playing and hand.state.options.xray
     hand.state.clock.playing = False
     first = hand.state.actor.clip.start

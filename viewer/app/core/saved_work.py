@@ -32,6 +32,8 @@ class SavedWork:
     _objects: list[object] = field(default_factory=list)
     edited: WeakSet[Figure | Motion] = field(default_factory=WeakSet)
     """Figures whose rig or mesh was edited, and fixed motions, saved or not."""
+    made: WeakSet[Figure] = field(default_factory=WeakSet)
+    """Figures that the Rig panel made."""
     rig: tuple[Path, ...] = ()
     """Files of the rig that was made for the scene's mesh and saved last: motions drive these."""
 
@@ -45,6 +47,10 @@ class SavedWork:
             self.add(actor.keyed)
             if actor.drive is not None:
                 self.add(actor.drive.joint_map)
+
+    def lacks_rig(self, figure: Figure) -> bool:
+        """Return whether a figure has a rig of the window that no file contains."""
+        return figure in self.made | self.edited and figure not in self and figure.is_attached
 
     def poses_of(self, actor: Actor) -> list[PoseKey]:
         """Return the poses of an actor that files contain."""

@@ -34,6 +34,7 @@ from viewer.phrases import printable
 from viewer.progress import Cancelled, part_of_work, silent
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rigs.captures.capture import CapturePart
+from viewer.rigs.figure import Figure
 from viewer.rigs.geometry.vectors import StatedUp
 from viewer.rigs.motion.sampled_clip import SampledClip, with_rate
 from viewer.rigs.motion.timing import DEFAULT_RATE
@@ -84,21 +85,23 @@ class Loader(ThreadJob):
         wake: Callable[[], None],
         settings: MotionSettings | None = None,
         opened: Sequence[Path] = (),
+        rig: Figure | None = None,
     ) -> None:
         self.paths: tuple[Path, ...] = tuple(paths)
         self.scene: Scene | None = None
         self.builders: list[Builder] = []
         self.addition: Contents | None = None
         """Poses and images for the open figure, if the files contain nothing else."""
-        self._given = (tuple(paths), attempts, wake, settings)
         self._attempts, self._settings = attempts, settings
-        self._opened = tuple(opened)
+        self._opened, self._rig = tuple(opened), rig
         title = f"Opening {printable(self.paths[-1].name, 60)}"
         super().__init__(title, self._try_all, wake=wake, names_steps=False, is_daemon=True)
 
-    def for_figure(self, opened: Sequence[Path]) -> Loader:
-        """Return a loader of the same files, whose motions drive the figure of other files."""
-        return Loader(*self._given, opened)
+    @property
+    def rig(self) -> Figure | None:
+        """The figure without a file that the motions drive in the new scene, None without one."""
+        shown = [] if self.scene is None else self.scene.actors
+        return next((actor.figure for actor in shown if actor.figure is self._rig), None)
 
     def _try_all(self) -> None:
         for paths in self._attempts:
@@ -120,7 +123,7 @@ class Loader(ThreadJob):
         self.paths = tuple(paths)
         if contents.is_addition:
             self.addition = contents
-        elif contents.needs_figure and self._opened:
+        elif contents.needs_figure and (self._opened or self._rig is not None):
             self._join(contents, paths)
         else:
             self.scene, self.builders = begin(contents, self._settings)
@@ -129,7 +132,11 @@ class Loader(ThreadJob):
         """Apply motions to the open figures; motions that match none are shown separately."""
         from viewer.loading.body_models import is_body
 
-        opened = read_files(self._opened, settings=self._settings)
+        if self._rig is None:
+            opened = read_files(self._opened, settings=self._settings)
+        else:
+            place = self._opened[0] if self._opened else Path(self._rig.name)
+            opened = Contents([(place, self._rig)], files=self._opened)
         figures = opened.figures
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         morphs = [*opened.morphs, *contents.morphs]
@@ -332,23 +339,22 @@ def open_files(state: AppState, paths: Sequence[Path]) -> None:
     if is_part and paths[0].suffix.lower() not in _ADDED:
         attempts.insert(0, [*state.paths, *paths])
     opened = state.of(SavedWork).rig or state.paths or bundled_files()
+    # Motions drive the rig that is shown, also before a file contains it.
+    shown, own = [actor.figure for actor in state.scene.actors if actor.visible], None
+    if len(shown) == 1 and state.of(SavedWork).lacks_rig(shown[0]):
+        own, opened = shown[0], state.paths
     rig, files.rig = files.rig, ""
     settings = MotionSettings(up=files.up, rig=rig, springs=True)
-    files.loader = Loader(paths, attempts, files.wake, settings, opened)
+    files.loader = Loader(paths, attempts, files.wake, settings, opened, own)
 
 
 def drive_saved_rig(state: AppState, written: Sequence[Path]) -> None:
-    """Let motions that are opened drive a rig that was saved, if it is all that is shown.
-
-    A motion whose opening has led to the question whether to save the rig is read again.
-    """
-    files, shown = state.of(Files), [actor for actor in state.scene.actors if actor.visible]
+    """Let motions that are opened drive a rig that was saved, if it is all that is shown."""
+    shown = [actor for actor in state.scene.actors if actor.visible]
     rig = [path for path in written if path.suffix.lower() in _RIGS]
     if len(shown) > 1 or not rig:
         return
     state.of(SavedWork).rig = tuple(rig)
-    if files.loader is not None:
-        files.loader = files.loader.for_figure(rig)
 
 
 def take_loaded(
@@ -378,7 +384,10 @@ def take_loaded(
             return False
         if files.stream is not None:
             files.stream.cancel()
+        rig = loader.rig
         state.show_scene(loader.scene, loader.paths)
+        if rig is not None:
+            state.of(SavedWork).edited.add(rig)
         stream_captures(state, loader.builders)
         if files.keeps_recent:
             state.say(*filter(None, [remember(files.recent, loader.paths)]))

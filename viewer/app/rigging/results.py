@@ -110,6 +110,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
         else:
             actors.append(result.actor)
         view.results[result.method] = result
+        state.of(SavedWork).made.add(result.rigged.figure)
     view.target, view.comparison, view.tool = target, comparison, ""
     view.ghost, view.scrolls = "", 2
     _look(state, results[0].method)
@@ -285,7 +286,8 @@ def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     files = files_of(path)
     inputs = result.template.paths
     act = partial(write_rigged, result.rigged, path)
-    save_in_background(state, act, files, inputs, [result], is_rig=True)
+    saved = [result, result.rigged.figure]
+    save_in_background(state, act, files, inputs, saved, is_rig=True)
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
