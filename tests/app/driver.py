@@ -175,16 +175,25 @@ class Driver:
                 self.step()
 
     def type(self, text, pressed=8):
-        """Type letters like a keyboard, the key and the character; further ones in one frame."""
+        """Type letters like a keyboard, the key and the character; further ones in one frame.
+
+        Each key is released in the frame in which the next one is pressed.
+        """
+        held = None
         for letter in text[:pressed]:
             code = getattr(imgui.Key, letter.lower() if letter.isalpha() else "", None)
+            if held is not None:
+                self.io.add_key_event(held, False)
+                if held is code:
+                    self.step()
             if code is not None:
                 self.io.add_key_event(code, True)
             self.io.add_input_character(ord(letter))
             self.step()
-            if code is not None:
-                self.io.add_key_event(code, False)
-                self.step()
+            held = code
+        if held is not None:
+            self.io.add_key_event(held, False)
+            self.step()
         if text[pressed:]:
             self.io.add_input_characters_utf8(text[pressed:])
             self.step()
