@@ -193,6 +193,20 @@ def test_joint_that_turns_within_a_frame_is_found_unless_others_do(steps, codes,
         assert f"rotates by {size}° within frame {first}" in one.message
 
 
+@pytest.mark.parametrize(("other", "codes"), [(0.0, ["C020.rotation"]), (12.0, [])])
+def test_pop_of_a_limb_that_is_as_quick_is_found_unless_others_have_one(other, codes):
+    """A swing as above, 15 degrees off a frame after it turned back, while other joints move."""
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 6, 1))
+    off = 1.0 * (K == 30)
+    for joint, by in ((1, other), (2, 0.0), (4, 0.0)):
+        turns[:, joint] = about_z(waving() + by * off)
+    turns[:, 3] = about_z(40.0 + 25.0 * np.cos(2.0 * np.pi * (K - 29.0) / 12.0) + 15.0 * off)
+    clip = SampledClip("x", Timing(RATE, K), turns, np.zeros((FRAMES, 6, 3)))
+    found = [*pops.check(Subject(Actor(arm(), clip=clip)))]
+    about_elbow = [one for one in found if 3 in one.joints]
+    assert [one.diagnostic.key for one in about_elbow] == codes
+
+
 @pytest.mark.parametrize(("name", "n_found"), [("left_eye", 0), ("eyelid_l", 0), ("left_ear", 1)])
 def test_eyes_and_lids_may_turn_for_a_few_frames(name, n_found):
     """A blink of three frames, by 40 degrees."""

@@ -81,6 +81,13 @@ _POPS = tuple(
         _Shape(n, 4, 6.0, 1.0, alike=True),
     )
 )
+# Where nothing else of the body has an edge in the frame, much less must stand out of the joint's
+# own movement: such a pop cannot be a blow or a landing.
+_LONE_POPS = tuple(
+    shape
+    for n in range(1, _LONGEST + 1)
+    for shape in (_Shape(n, 2, 1.5, 1.0, returns=True), _Shape(n, 4, 2.0, 2.0))
+)
 _STEPS = (_Shape(0, 2, 4.0, 0.5), _Shape(0, 3, 4.0, 0.5), _Shape(0, 4, 6.0, 1.0))
 
 
@@ -97,7 +104,10 @@ def check(subject: Subject) -> Iterator[Finding]:
     longer = _longer(track, rows)
     # Close to each other, unit quaternions are half the angle of their rotation apart.
     turns = 2.0 * track.turns(rows)
-    found = _found(turns, known, _POPS, _ANGLE * longer)
+    found = _together(
+        _found(turns, known, _POPS, _ANGLE * longer),
+        _alone(_found(turns, known, _LONE_POPS, _ANGLE * longer), turns),
+    )
     if found is not None:
         yield _finding(
             subject,
@@ -271,7 +281,7 @@ def _matches(
 
 
 def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
-    """Return the steps in whose frames other joints move, but none has an edge."""
+    """Return those in whose first frames other joints move, but none has an edge."""
     if found is None:
         return None
     # Half a third difference is the edge of a step: x = 0 0 1 1 has -2 = 1 - 3.
@@ -287,6 +297,16 @@ def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
         return None
     each = tuple(found.frames[k] for k in keep.tolist())
     return OffPath(found.sizes[keep], each, found.columns[keep])
+
+
+def _together(found: OffPath | None, more: OffPath | None) -> OffPath | None:
+    """Return what either has, the largest first."""
+    if found is None or more is None:
+        return found or more
+    sizes, frames = np.concatenate([found.sizes, more.sizes]), (*found.frames, *more.frames)
+    order = np.argsort(-sizes, kind="stable")
+    columns = np.concatenate([found.columns, more.columns])
+    return OffPath(sizes[order], tuple(frames[k] for k in order.tolist()), columns[order])
 
 
 def _longer(track: Track, rows: Indices) -> float:
