@@ -132,7 +132,7 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         *_weight_lines(mesh, found, how.method),
         *(with_joint_name(line, figure) for line in rigid_lines(weights.rigid, from_bones=True)),
         *_bone_lines(skeleton, bones, skin),
-        *check_lines(figure, guarded, out, residual),
+        *check_lines(figure, posed, guarded, out, residual),
     )
     rigged = Rigged(
         figure=figure,

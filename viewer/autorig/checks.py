@@ -19,7 +19,6 @@ from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import Mesh, bounding_box, box_size
 from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import joint_label
-from viewer.rigs.skin import bind_positions
 from viewer.rigs.skinning import deform, joint_matrices
 
 _EXACT = 1e-4  # ratio of residual to size above which a warning is given
@@ -76,7 +75,7 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
 
 
 def check_lines(
-    figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float
+    figure: Figure, pose: Pose, guarded: Bools, out: tuple[int, ...], residual: float
 ) -> Iterator[Diagnostic]:
     """Return messages about the results of ``invert_skinning`` and of the checks above."""
     if out:
@@ -103,7 +102,7 @@ def check_lines(
             vertices,
             values,
         )
-    yield from _torn_lines(figure)
+    yield from _torn_lines(figure, pose)
     yield note(
         "R011.residual: after posing, the mesh differs from the target by at most "
         "{residual:.3%} of its size",
@@ -117,8 +116,8 @@ def check_lines(
         )
 
 
-def _torn_lines(figure: Figure) -> Iterator[Diagnostic]:
-    """Return a message about places that tear when a joint rotates.
+def _torn_lines(figure: Figure, pose: Pose) -> Iterator[Diagnostic]:
+    """Return a message about places that tear when a joint rotates from the pose of the target.
 
     Where neighbours have the weights a and b of all joints below one at the distance r, and it
     rotates by t about the worst axis, they move apart by 2 |a - b| r sin(t / 2).
@@ -126,6 +125,7 @@ def _torn_lines(figure: Figure) -> Iterator[Diagnostic]:
     from scipy import sparse
 
     mesh, skeleton, skin = figure.attached()
+    positions, places = deform(figure, pose)[0], joint_matrices(figure, pose)[:, :3, 3]
     links, count = edges(mesh.triangles), skin.n_joints
     weights = sparse.csr_array(
         (skin.weights, skin.joints, skin.starts), shape=(skin.n_vertices, count)
@@ -134,11 +134,11 @@ def _torn_lines(figure: Figure) -> Iterator[Diagnostic]:
     total = weights @ sparse.csr_array(below.astype(float))
     steps = sparse.coo_array(total[links[:, 0]] - total[links[:, 1]])
     rows, joints = steps.coords
-    ends = mesh.positions[links]
+    ends = positions[links]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    arms = np.linalg.norm(ends.mean(axis=1)[rows] - bind_positions(skin)[joints], axis=1)
+    arms = np.linalg.norm(ends.mean(axis=1)[rows] - places[joints], axis=1)
     gaps = 2.0 * np.sin(0.5 * _BEND) * np.abs(steps.data) * arms
-    size = box_size(bounding_box(mesh.positions))
+    size = box_size(bounding_box(positions))
     torn = np.flatnonzero((gaps > _GAP * size) & (gaps > _LONGER * lengths[rows]))
     # An edge may tear by several joints of a chain: the one that tears it most is named.
     torn = torn[np.argsort(-gaps[torn], kind="stable")]

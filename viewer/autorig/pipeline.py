@@ -133,7 +133,7 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
         *rest.lines,
         *_judged(template, figure, weights),
         *_dropped_parts(template, figure, how),
-        *check_lines(figure, guarded, out, residual),
+        *check_lines(figure, rest.pose, guarded, out, residual),
     ]
     return Rigged(
         figure=figure,

@@ -67,7 +67,7 @@ def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
             **matched,
         ),
         note("R008.copied: joints: copied from the template"),
-        *check_lines(figure, found.guarded, out, residual),
+        *check_lines(figure, pose, found.guarded, out, residual),
     )
     return Rigged(
         figure=figure,
