@@ -154,6 +154,26 @@ def test_small_separate_part_moves_rigidly_and_is_named():
 
 
 @pytest.mark.parametrize("method", BINDING)
+def test_small_part_follows_the_surface_beneath_where_another_bone_is_nearest(method):
+    # The bar has vertices at y = 2/3 and 4/3, so that its surface at 1.05 moves mostly with the
+    # upper joint, which is at 1.1: the nearest bone is the lower one.
+    bar = box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), (2, 3, 2))
+    button = box((-0.02, 1.03, 0.11), (0.02, 1.07, 0.13), (1, 1, 1))
+    chain = {**CHAIN, "middle": ("base", (0, 1.1, 0))}
+    rigged = bound(skeleton_of(chain), joined(bar, button), method)
+    found = of(rigged, "middle")
+    is_front = (np.abs(bar[0][:, 0]) < 1e-9) & (bar[0][:, 2] > 0.0)
+    low, high = (found[:-8][is_front & (np.abs(bar[0][:, 1] - y) < 1e-9)] for y in (2 / 3, 4 / 3))
+    # Linear between the rings, of which the one on the other side of the face adds a little.
+    expected = low + (high - low) * (1.05 - 2 / 3) / (2 / 3)
+    assert expected > 0.5
+    assert_allclose(found[-8:], expected[0], atol=0.02)
+    assert np.ptp(weights_of(rigged)[-8:], axis=0).max() < 1e-12
+    (line,) = (str(line) for line in rigged.lines if line.code == "R007")
+    assert line.startswith("1 small part moves with the surface beneath, ")
+
+
+@pytest.mark.parametrize("method", BINDING)
 def test_part_that_two_sides_share_moves_with_the_joint_above_both(method):
     # A beam rests on two posts: without a vertex between its ends, it cannot bend. About a quarter
     # is nearest to the joint in its middle, and more to each side.

@@ -131,6 +131,7 @@ def bind(source: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: 
         *_size_lines(source, skeleton, joints, moved, solid),
         *_weight_lines(mesh, found, how.method),
         *(with_joint_name(line, figure) for line in rigid_lines(weights.rigid, from_bones=True)),
+        *_trifle_lines(int(found.lies.sum())),
         *_bone_lines(skeleton, bones, skin),
         *check_lines(figure, posed, guarded, out, residual),
     )
@@ -471,6 +472,16 @@ def _weight_lines(mesh: Welded, found: BoneWeights, method: str) -> Iterator[Dia
         n=sees,
         all=count,
     )
+
+
+def _trifle_lines(count: int) -> Iterator[Diagnostic]:
+    """Return a message about parts with the weights of the surface beneath them."""
+    if count:
+        yield note(
+            "R007.trifles: {n} {move} with the surface beneath, not with the nearest bone",
+            n=counted(count, "small part"),
+            move=agree(count, "moves", "move"),
+        )
 
 
 def _bone_lines(skeleton: Skeleton, bones: Bones, skin: Skin) -> Iterator[Diagnostic]:
