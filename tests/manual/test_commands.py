@@ -4,8 +4,9 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from contextlib import nullcontext
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -101,8 +102,21 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def converted(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], list[Path]]:
+    """A function that returns the files of a conversion, which runs once."""
+
+    @cache
+    def files_of(source: str, name: str) -> list[Path]:
+        folder = tmp_path_factory.mktemp("own")
+        assert run(["convert", source, "-o", str(folder / name)]) == 0
+        return sorted(folder.iterdir())
+
+    return files_of
+
+
 @pytest.mark.parametrize("line", RUN)
-def test_command_runs(line, files, tmp_path, monkeypatch, capsys):
+def test_command_runs(line, files, converted, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "work"
     shutil.copytree(files, folder, copy_function=os.link)
     monkeypatch.chdir(folder)
@@ -112,7 +126,9 @@ def test_command_runs(line, files, tmp_path, monkeypatch, capsys):
     assert run(["models", "--model-path", str(folder / HOME / "models")]) == 0
     for name, source in OWN.get(RUN[line], {}).items():
         (folder / name).unlink()
-        assert source is None or run(["convert", source, "-o", name]) == 0
+        for path in converted(source, name) if source else ():
+            (folder / path.name).unlink(missing_ok=True)
+            os.link(path, folder / path.name)
     words = words_of(line)
     outputs = [words[at + 1] for at, word in enumerate(words) if word in OUTPUTS]
     for output in outputs:
