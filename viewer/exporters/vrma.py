@@ -23,7 +23,7 @@ from viewer.exporters._options import ExportOptions
 from viewer.exporters.gltf.document import Document, text_of
 from viewer.exporters.gltf.keyed import AnimationParts
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.exporters.vrm.humanoid import ancestors_of, human_bones, parent_bone
+from viewer.exporters.vrm.humanoid import human_bones
 from viewer.exporters.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
@@ -32,6 +32,7 @@ from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.file_record import Json
 from viewer.rigs.geometry.quaternion import align_signs
 from viewer.rigs.geometry.rotation import axis_rotations, matrix_to_quaternion
+from viewer.rigs.humanoid import ancestors_of, parent_bone
 from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.motion.evaluation import Frames, frames_of, world_frames
 from viewer.rigs.motion.sampled_animation import SampledAnimation

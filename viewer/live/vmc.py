@@ -38,7 +38,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import OutputError, RigError, ViewerError, reason_of
 from viewer.exporters.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.exporters.vrm.humanoid import ancestors_of, human_bones, parent_bone
+from viewer.exporters.vrm.humanoid import human_bones
 from viewer.formats._vrm.bones import modern_bone
 from viewer.live.osc import LARGEST, OscError, bundles, message_bytes, messages_of
 from viewer.phrases import printable
@@ -46,7 +46,7 @@ from viewer.rigs.arrays import Floats
 from viewer.rigs.expressions import OLD_PRESETS
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
-from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES
+from viewer.rigs.humanoid import HUMAN_BONES, SPINE_BONES, ancestors_of, parent_bone
 from viewer.rigs.kinematics import posed_skeleton, world_matrices
 from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, set_joint_rotations
 from viewer.rigs.retargeting.retarget import expression_columns

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from functools import cache
 
 from viewer.data_classes import dataclass
 
@@ -48,6 +49,48 @@ REQUIRED_BONES = (
     *(f"{side}{limb}" for side in ("left", "right") for limb in _LIMBS),
 )
 """Bones that every VRM character must have."""
+
+
+_ABOVE = {
+    **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},
+    **{"UpperLeg": "hips", "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Toes": "Foot"},
+    **{"Shoulder": "spine", "UpperArm": "spine", "LowerArm": "UpperArm", "Hand": "LowerArm"},
+    **{"Eye": "head", "jaw": "head"},
+    **{"ThumbMetacarpal": "Hand", "ThumbProximal": "ThumbMetacarpal"},
+    "ThumbDistal": "ThumbProximal",
+}
+"""Required ancestor of each listed bone."""
+_ALL_ABOVE = {
+    **{"neck": "upperChest", "leftShoulder": "upperChest", "rightShoulder": "upperChest"},
+    **{"head": "neck", "leftUpperArm": "leftShoulder", "rightUpperArm": "rightShoulder"},
+}
+"""Ancestors of bones in a complete skeleton, where optional bones are between required ones."""
+_FINGERS = ("Index", "Middle", "Ring", "Little")
+_PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
+
+
+def bone_above(bone: str) -> str:
+    """Return the required ancestor of a bone; empty for the hips."""
+    side = next((side for side in ("left", "right") if bone.startswith(side)), "")
+    name = bone.removeprefix(side)
+    for finger in _FINGERS:
+        if side and name.startswith(finger):
+            above = _PHALANGES[name.removeprefix(finger)]
+            return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
+    found = _ABOVE.get(name, "")
+    return f"{side}{found}" if found[:1].isupper() else found
+
+
+def parent_bone(bone: str, bones: Container[str]) -> str:
+    """Return the nearest ancestor of a bone among some bones; empty if there is none."""
+    return next((above for above in ancestors_of(bone) if above in bones), "")
+
+
+@cache
+def ancestors_of(bone: str) -> tuple[str, ...]:
+    """Return the ancestors of a bone in a complete skeleton, nearest first."""
+    above = _ALL_ABOVE.get(bone) or bone_above(bone)
+    return (above, *ancestors_of(above)) if above else ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -54,6 +54,30 @@ def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
     return {**told, "meta": meta, "expressions": {"preset": expressions}}
 
 
+@pytest.mark.parametrize(
+    ("bones", "said"),
+    [
+        ({}, []),
+        # Node 4 is the left arm, 3 the head, 1 between the hips and all others.
+        (
+            {"hips": 1, "spine": 0},
+            ['"spine": expected a node below that of "hips" (node 1), found node 0'],
+        ),
+        (
+            {"leftLowerArm": 3},
+            ['"leftLowerArm": expected a node below that of "leftUpperArm" (node 4), found node 3'],
+        ),
+    ],
+)
+def test_bones_below_another_than_their_own_parent_are_named(bones, said, tmp_path):
+    told = _modern({})
+    told["humanoid"]["humanBones"].update({bone: {"node": node} for bone, node in bones.items()})
+    told["humanoid"]["humanBones"].pop("head" if 3 in bones.values() else "", None)
+    scene, _ = _loaded(_file(VRMC_vrm=told), tmp_path)
+    found = [one.message for one in scene.diagnostics if one.key == "G008.bone-parent"]
+    assert found == [f"human bone {text}" for text in said]
+
+
 def test_joints_with_any_names_are_identified_by_bones(tmp_path):
     scene, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     skeleton = figure.require_skeleton()

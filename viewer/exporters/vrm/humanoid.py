@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
-from functools import cache
+from collections.abc import Mapping
 
 from viewer.diagnostics import note
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.rigs.figure import Figure
 from viewer.rigs.hierarchy import path_to_root
-from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES, bone_above
 from viewer.rigs.retargeting.joint_names import joint_meanings
 from viewer.rigs.skeleton import Skeleton
-
-_ABOVE = {
-    **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},
-    **{"UpperLeg": "hips", "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Toes": "Foot"},
-    **{"Shoulder": "spine", "UpperArm": "spine", "LowerArm": "UpperArm", "Hand": "LowerArm"},
-    **{"Eye": "head", "jaw": "head"},
-    **{"ThumbMetacarpal": "Hand", "ThumbProximal": "ThumbMetacarpal"},
-    "ThumbDistal": "ThumbProximal",
-}
-"""Required ancestor of each listed bone."""
-_ALL_ABOVE = {
-    **{"neck": "upperChest", "leftShoulder": "upperChest", "rightShoulder": "upperChest"},
-    **{"head": "neck", "leftUpperArm": "leftShoulder", "rightUpperArm": "rightShoulder"},
-}
-"""Ancestors of bones in a complete skeleton, where optional bones are between required ones."""
-_FINGERS = ("Index", "Middle", "Ring", "Little")
-_PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
 
 
 def human_bones(figure: Figure) -> dict[str, int]:
@@ -70,30 +52,6 @@ def _named(skeleton: Skeleton) -> dict[str, int]:
     found = {bone: joints[name] for bone, name in HUMAN_BONES.items() if name in joints}
     spine = [joints[name] for name in ("spine1", "spine2", "spine3") if name in joints]
     return found | dict(zip(SPINE_BONES, spine, strict=False))
-
-
-def bone_above(bone: str) -> str:
-    """Return the required ancestor of a bone; empty for the hips."""
-    side = next((side for side in ("left", "right") if bone.startswith(side)), "")
-    name = bone.removeprefix(side)
-    for finger in _FINGERS:
-        if side and name.startswith(finger):
-            above = _PHALANGES[name.removeprefix(finger)]
-            return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
-    found = _ABOVE.get(name, "")
-    return f"{side}{found}" if found[:1].isupper() else found
-
-
-def parent_bone(bone: str, bones: Container[str]) -> str:
-    """Return the nearest ancestor of a bone among some bones; empty if there is none."""
-    return next((above for above in ancestors_of(bone) if above in bones), "")
-
-
-@cache
-def ancestors_of(bone: str) -> tuple[str, ...]:
-    """Return the ancestors of a bone in a complete skeleton, nearest first."""
-    above = _ALL_ABOVE.get(bone) or bone_above(bone)
-    return (above, *ancestors_of(above)) if above else ()
 
 
 def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:

@@ -12,8 +12,10 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.parts import list_in, part
 from viewer.phrases import counted, listed, quoted
+from viewer.rigs.arrays import Ints
 from viewer.rigs.file_record import Json
-from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+from viewer.rigs.hierarchy import path_to_root
+from viewer.rigs.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES, bone_above
 
 _MODERN = "1.0"
 MOST_WEIGHT = {0: 100.0, 1: 1.0}
@@ -21,8 +23,13 @@ MOST_WEIGHT = {0: 100.0, 1: 1.0}
 _REQUIRED_META = ("name", "authors", "licenseUrl")
 
 
-def check_character(source: Source, extensions: Mapping[str, object], version: int) -> None:
-    """Report what a VRM character lacks or states twice; each place has a JSON pointer."""
+def check_character(
+    source: Source, extensions: Mapping[str, object], version: int, parents: Ints
+) -> None:
+    """Report what a VRM character lacks or states twice; each place has a JSON pointer.
+
+    ``parents``: (N,), of the nodes.
+    """
     key = "VRMC_vrm" if version == 1 else "VRM"
     told, at = extensions[key], f"/extensions/{key}"
     if isinstance(extensions.get("VRM"), dict) and version == 1:
@@ -49,7 +56,7 @@ def check_character(source: Source, extensions: Mapping[str, object], version: i
             f"{at}/meta",
             names=listed(missing),
         )
-    _check_bones(source, told, version, f"{at}/humanoid/humanBones")
+    _check_bones(source, told, version, f"{at}/humanoid/humanBones", parents)
     for bind, place, name in weighted_binds(told, version):
         if not is_weight(weight := bind["weight"], version):
             most = MOST_WEIGHT[version]
@@ -62,8 +69,8 @@ def check_character(source: Source, extensions: Mapping[str, object], version: i
             )
 
 
-def _check_bones(source: Source, told: object, version: int, at: str) -> None:
-    """Check that all required bones occur, each once and with its own node."""
+def _check_bones(source: Source, told: object, version: int, at: str, parents: Ints) -> None:
+    """Check that all required bones occur, each once and with its own node, below its parent."""
     given = given_bones(told, version)
     if missing := [bone for bone in REQUIRED_BONES if bone not in {bone for _, bone, _ in given}]:
         source.warn(
@@ -90,6 +97,21 @@ def _check_bones(source: Source, told: object, version: int, at: str) -> None:
         elif type(node) is int:
             owners[node] = bone
         seen.add(bone)
+    nodes = {bone: node for node, bone in owners.items() if 0 <= node < len(parents)}
+    for place, bone, node in given:
+        above = bone_above(bone)
+        if above not in nodes or bone not in nodes or nodes[bone] != node:
+            continue
+        if nodes[above] not in path_to_root(parents, nodes[bone])[1:]:
+            source.warn(
+                "G008.bone-parent: human bone {bone}: expected a node below that of {above} (node "
+                "{other}), found node {node}",
+                f"{at}/{place}",
+                bone=quoted(bone),
+                above=quoted(above),
+                other=nodes[above],
+                node=nodes[bone],
+            )
     for found in source.diagnostics:
         if found.key == "G001.repeated" and version == 1:
             for bone in found.values["names"]:

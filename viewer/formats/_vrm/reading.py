@@ -96,7 +96,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     if version is None:
         return replace(file, facts=_contents(file))
     told, pointer = given[_KEYS[version]], f"/extensions/{_KEYS[version]}"
-    check_character(source, given, version)
+    check_character(source, given, version, file.tree.parents)
     humanoid = read_humanoid(source, file, told, version, pointer)
     if old is None:
         kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
