@@ -34,6 +34,7 @@ from viewer.autorig.solid import Solid, solid_within
 from viewer.data_classes import dataclass
 from viewer.progress import part_of_work, report_fraction
 from viewer.rigs.arrays import Bools, Floats, Ints
+from viewer.rigs.memo import Memo
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -254,6 +255,9 @@ def sagittal_plane(
     return sagittal_planes(solid, up, lateral)[0]
 
 
+_planes: Memo[Solid, list[tuple[Floats, float, float]]] = Memo()
+
+
 def sagittal_planes(
     solid: Solid, up: Floats, lateral: Floats | None = None
 ) -> list[tuple[Floats, float, float]]:
@@ -262,6 +266,14 @@ def sagittal_planes(
     Unless the solid is symmetric, also those of the best plane in another direction: front and back
     of a person differ less than the sides if one hand holds a staff or a shield.
     """
+    # A skeleton is completed, named and placed with the same planes.
+    key = up.tobytes(), None if lateral is None else lateral.tobytes()
+    return _planes.get(solid, key, lambda: _found_planes(solid, up, lateral))
+
+
+def _found_planes(
+    solid: Solid, up: Floats, lateral: Floats | None
+) -> list[tuple[Floats, float, float]]:
     from scipy import ndimage
 
     # Within one voxel, the mirror image of the boundary is inside or outside by chance.
@@ -311,12 +323,21 @@ def _symmetry(solid: Solid, around: Bools, points: Floats, normal: Floats) -> tu
     # The plane halves a symmetric solid; props on one side move the halving plane a little.
     offsets = float(np.median(along)) + solid.spacing * np.linspace(-_SHIFT, _SHIFT, 4 * _SHIFT + 1)
     fractions = []
+    columns, inside = np.ascontiguousarray(points.T), around.ravel()
     for offset in offsets.tolist():
         arms = along - offset
-        mirrored = points - 2.0 * arms[:, None] * normal
+        # The voxels of the mirror images, as ``Solid.voxel_of`` returns them, but by columns, which
+        # takes a third of the time.
+        rows = np.zeros(len(arms))
+        for column, part, start, count in zip(
+            columns, normal.tolist(), solid.origin.tolist(), around.shape, strict=True
+        ):
+            mirrored = column - 2.0 * arms * part
+            voxel = np.rint((mirrored - start) / solid.spacing)
+            rows = rows * count + np.minimum(np.maximum(voxel, 0), count - 1)
         # Every section near the middle is symmetric: what is far from the plane counts more.
         weights = np.abs(arms)
-        found = around[tuple(solid.voxel_of(mirrored).T)]
+        found = inside[rows.astype(np.intp)]
         fractions.append(float(weights @ found) / max(float(weights.sum()), 1e-12))
     # The middle one of equally good planes.
     best = np.flatnonzero(np.array(fractions) >= max(fractions) - 1e-3)
