@@ -32,7 +32,7 @@ class Paths:
         self.radii, self._spacing = solid.radii(), solid.spacing
         # Close to the surface, the radius is known to half a voxel only.
         wide = np.maximum(self.radii / solid.spacing, 0.5)
-        self._graph: csr_array = solid.graph(wide**-_MEDIAL)
+        self._graph = _weighted(self.steps, wide**-_MEDIAL)
         self.n_cuts = 0
         """Number of cuts."""
 
@@ -96,6 +96,15 @@ class Paths:
                 ways.setdefault(row, rows[: index + 1])
             found.append(np.array(rows, dtype=np.int32))
         return found
+
+
+def _weighted(steps: csr_array, costs: Floats) -> csr_array:
+    """Return steps whose lengths inside each voxel are multiplied by costs (N,)."""
+    from scipy.sparse import csr_array
+
+    starts = np.repeat(np.arange(len(costs)), np.diff(steps.indptr))
+    lengths = steps.data * 0.5 * (costs[starts] + costs[steps.indices])
+    return csr_array((lengths, steps.indices, steps.indptr), steps.shape)
 
 
 def _cut(graph: csr_array, first: Bools, second: Bools) -> tuple[csr_array, Ints]:

@@ -109,27 +109,24 @@ class Solid:
         found: Floats = self.distance[tuple(self.voxels.T)]
         return found
 
-    def graph(self, costs: Floats | None = None) -> csr_array:
-        """Return the lengths of steps to the 26 neighbours, sparse (N, N).
-
-        ``costs`` (N,): factors of the length inside each voxel, by default 1.
-        """
+    def graph(self) -> csr_array:
+        """Return the lengths of steps to the 26 neighbours, sparse (N, N)."""
         from scipy import sparse
 
         starts, ends, lengths = [], [], []
         padded = np.pad(self.numbers, 1, constant_values=-1)
+        numbers, places = padded.ravel(), np.ravel_multi_index((self.voxels + 1).T, padded.shape)
+        strides = np.array(padded.strides) // padded.itemsize
         rows = np.arange(len(self.voxels))
         # One of each pair of opposite steps suffices: the matrix is symmetric.
         steps = np.array(list(np.ndindex(3, 3, 3)))[14:] - 1
         for step in steps:
-            other = padded[tuple((self.voxels + step + 1).T)]
+            other = numbers[places + int(step @ strides)]
             found = other >= 0
             starts.append(rows[found])
             ends.append(other[found])
             lengths.append(np.full(int(found.sum()), self.spacing * np.linalg.norm(step)))
         a, b, length = (np.concatenate(parts) for parts in (starts, ends, lengths))
-        if costs is not None:
-            length = length * 0.5 * (costs[a] + costs[b])
         matrix = sparse.coo_array((length, (a, b)), shape=(len(rows), len(rows)))
         return sparse.csr_array(matrix + matrix.T)
 
