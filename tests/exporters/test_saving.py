@@ -20,7 +20,9 @@ from seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
 
 import viewer
 from viewer import formats
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import TransferSettings
 from viewer.cli import run
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.exporters import (
@@ -51,6 +53,8 @@ WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
 SUFFIXES = [kind.suffixes[0] for kind in WRITERS if "pose" in kind.stores]
 # The files that each exporter writes for the figure below, which has two textures.
 SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1, ".html": 1}
+# The template is where the target is.
+IN_PLACE = TransferSettings(alignment=AlignmentSettings(matrix=np.eye(4)), fits=False)
 # Existing files by the suffix of the output.
 BESIDE = {".skel": (".skin",)}
 
@@ -370,7 +374,7 @@ def rigged():
     pose = rest_pose(template.skeleton)
     pose.dofs[6:] = 0.2, -0.1, 0.7
     target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
-    return target, transfer(template, pose, target)
+    return target, transfer(template, pose, target, IN_PLACE)
 
 
 def test_pose_file_fits_a_skeleton_whose_rest_rotations_became_angles(tmp_path):
@@ -384,7 +388,7 @@ def test_pose_file_fits_a_skeleton_whose_rest_rotations_became_angles(tmp_path):
     pose = rest_pose(joints)
     pose.dofs[-3:] = 0.2, -0.1, 0.7
     target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
-    write_rigged(transfer(template, pose, target), tmp_path / "arm.skel")
+    write_rigged(transfer(template, pose, target, IN_PLACE), tmp_path / "arm.skel")
     again = viewer.load(tmp_path / "arm.skel", tmp_path / "arm.skin").actors[0]
     record = formats.read(formats.Source.open(tmp_path / "arm.json"))
     assert apply_record(record, again.figure, again.pose) == []
