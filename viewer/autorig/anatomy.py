@@ -436,10 +436,15 @@ class BodyPoints:
 
 def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) -> list[Plan]:
     """Return the likely plans of a figure, both facings of each unless ``front`` is known."""
-    if len(anatomy.pairs) < 2:
+    pairs = anatomy.pairs
+    if not pairs:
         return []
-    standing = [pair for pair in anatomy.pairs if anatomy.stands(pair)]
-    heights = {id(pair): float(pair.attachment @ anatomy.up) for pair in anatomy.pairs}
+    standing = [pair for pair in pairs if anatomy.stands(pair)]
+    if not (standing or is_quadruped) and (touching := _touching_legs(anatomy)) is not None:
+        pairs, standing = (*pairs, touching), [touching]
+    if len(pairs) < 2:
+        return []
+    heights = {id(pair): float(pair.attachment @ anatomy.up) for pair in pairs}
     found = []
     if is_quadruped:
         for hind, fore in ((a, b) for a in standing[:2] for b in standing[:2] if a is not b):
@@ -450,10 +455,10 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
                 found.append(Plan(hind, fore, left))
         return found
     # The corners of a cape or a coat that reach the ground lead sideways, not up.
-    lowest = [pair for pair in standing if anatomy.rise(pair) >= _UPWARDS] or anatomy.pairs
+    lowest = [pair for pair in standing if anatomy.rise(pair) >= _UPWARDS] or pairs
     legs = min(lowest, key=lambda pair: heights[id(pair)])
     lower = _up_to_crotch(anatomy, legs)
-    above = [pair for pair in anatomy.pairs if _rises(anatomy, legs, pair) and not pair.is_bump]
+    above = [pair for pair in pairs if _rises(anatomy, legs, pair) and not pair.is_bump]
     longest = max((pair.length for pair in above), default=0.0)
     # Ears, horns and capes are shorter than arms, or are attached above them.
     arms = [pair for pair in above if pair.length >= _AS_LONG * longest]
@@ -470,24 +475,51 @@ def plans_of(anatomy: Anatomy, is_quadruped: bool, front: Floats | None = None) 
 def _up_to_crotch(anatomy: Anatomy, pair: LimbPair) -> LimbPair:
     """Return legs, those that touch each other above their fork up to where the groove ends.
 
-    Wide trousers and thick legs leave a gap only above the feet, but sections above it are those of
-    two legs: between them, they are less deep than in the middle of each.
+    Wide trousers and thick legs leave a gap only above the feet.
+    """
+    up, fork = anatomy.up, float(pair.attachment @ anatomy.up)
+    apart = [np.abs(limb.points @ anatomy.lateral - anatomy.offset) for limb in pair.limbs]
+    axis = float(np.mean([np.median(each) for each in apart]))
+    above = _touching(anatomy, fork, axis)
+    if above is None:
+        return pair
+    limbs = []
+    for limb, more in zip(pair.limbs, above.limbs, strict=True):
+        # The path turns to the plane below the fork; the leg goes on.
+        kept = limb.points @ up <= fork - axis
+        points = np.concatenate([limb.points[kept], more.points])
+        radii = np.concatenate([limb.radii[kept], more.radii])
+        limbs.append(Limb(points, radii, more.attachment, limb.length + more.length))
+    return LimbPair((limbs[0], limbs[1]))
+
+
+def _touching_legs(anatomy: Anatomy) -> LimbPair | None:
+    """Return legs that touch each other down to the soles."""
+    solid = anatomy.solid
+    centers = solid.centers(solid.voxels)
+    soles = centers @ anatomy.up - anatomy.ground <= _ON_GROUND * anatomy.height
+    axis = float(np.abs(centers[soles] @ anatomy.lateral - anatomy.offset).mean())
+    return _touching(anatomy, anatomy.ground, axis)
+
+
+def _touching(anatomy: Anatomy, low: float, axis: float) -> LimbPair | None:
+    """Return the parts of legs from a height to the crotch; None if they do not touch there.
+
+    Sections above the fork of such legs are those of two legs: between them, they are less deep
+    than in the middle of each. ``axis``: about the distance of the legs' axes from the plane.
     """
     from scipy import ndimage
 
     solid, up, step = anatomy.solid, anatomy.up, anatomy.solid.spacing
     centers = solid.centers(solid.voxels)
     heights, sides = centers @ up, centers @ anatomy.lateral - anatomy.offset
-    fork = float(pair.attachment @ up)
-    apart = [np.abs(limb.points @ anatomy.lateral - anatomy.offset) for limb in pair.limbs]
-    axis = float(np.mean([np.median(each) for each in apart]))
-    near = (np.abs(sides) <= 2.0 * axis) & (heights >= fork)
+    near = (np.abs(sides) <= 2.0 * axis) & (heights >= low)
     if not near.any():
-        return pair
+        return None
     # Layers and columns of voxels, counted from one of them: it is in the middle of its own.
     levels = np.rint((heights - heights[near].min()) / step).astype(np.int64)
     columns = np.rint((sides - sides[near].min()) / step).astype(np.int64)
-    depths = np.zeros((levels[near].max() + 1, columns[near].max() + 1))
+    depths = np.zeros((levels[near].max() + 1, max(int(columns[near].max()) + 1, 3)))
     np.add.at(depths, (levels[near], columns[near]), 1.0)
     depths = ndimage.uniform_filter1d(depths, 3, axis=1, mode="constant")
     middle = int(np.clip(np.rint(-sides[near].min() / step), 1, depths.shape[1] - 2))
@@ -496,18 +528,13 @@ def _up_to_crotch(anatomy: Anatomy, pair: LimbPair) -> LimbPair:
     top = int(merged[0]) if len(merged) else 0
     # The arch of a crotch is as high as half of the distance of its legs.
     if top * step <= axis:
-        return pair
+        return None
+    crotch = centers[near & (levels == top) & (np.abs(sides) <= 2.0 * step)].mean(axis=0)
     limbs = []
-    attachment = centers[near & (levels == top) & (np.abs(sides) <= 2.0 * step)].mean(axis=0)
-    for limb in pair.limbs:
-        is_own = near & (sides * float((limb.points[0] @ anatomy.lateral) - anatomy.offset) > 0.0)
-        above = [centers[is_own & (levels == level)].mean(axis=0) for level in range(top)]
-        # The path turns to the plane below the fork; the leg goes on.
-        kept = limb.points @ up <= fork - axis
-        rows = solid.nearest(np.stack([*above, attachment]))
-        points = np.concatenate([limb.points[kept], centers[rows]])
-        radii = np.concatenate([limb.radii[kept], anatomy.paths.radii[rows]])
-        limbs.append(Limb(points, radii, attachment, limb.length + top * step))
+    for is_own in (near & (sides > 0.0), near & (sides < 0.0)):
+        middles = [centers[is_own & (levels == level)].mean(axis=0) for level in range(top)]
+        rows = solid.nearest(np.stack([*middles, crotch]))
+        limbs.append(Limb(centers[rows], anatomy.paths.radii[rows], crotch, top * step))
     return LimbPair((limbs[0], limbs[1]))
 
 
