@@ -261,9 +261,8 @@ def test_hands_that_touch_the_trunk_come_to_the_skin_of_a_slim_one(radius, rate)
         assert np.abs(after - radius).max() < 0.03 * HEIGHT
 
 
-@pytest.mark.parametrize("radius", [6.0, 9.0])
-def test_hands_with_a_skin_clap_without_going_through_each_other(radius):
-    source, figure = clapping(), clothed(*tube(radius), figure=body(arms=1.6))
+def test_hands_with_a_skin_clap_without_going_through_each_other():
+    source, figure = clapping(), clothed(*tube(9.0), figure=body(arms=1.6))
     found = retarget(source, figure, source_rest="auto")
     clip, _ = keep_hands(found, found.clip, figure)
     theirs, before, after = (
@@ -278,10 +277,9 @@ def test_hands_with_a_skin_clap_without_going_through_each_other(radius):
     assert np.abs(after[met] - 2.0 * TIP).max() < 0.03 * HEIGHT and after.min() > 0.0
 
 
-@pytest.mark.parametrize("radius", [22.0, 30.0])
-def test_hands_on_the_crown_come_to_the_skin_of_a_head(radius):
+def test_hands_on_the_crown_come_to_the_skin_of_a_head():
     source, figure = raised(np.array([8.0, 186.0])), body(arms=1.4)
-    corners, faces = octahedron(radius)
+    corners, faces = octahedron(radius := 22.0)
     head = places_at_rest(figure)["Head_"]
     figure = clothed(head + corners, faces, "Head_", figure)
     found = retarget(source, figure, source_rest="auto")

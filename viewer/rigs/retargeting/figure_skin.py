@@ -15,13 +15,14 @@ from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import area_vectors
-from viewer.rigs.retargeting.body_parts import ARMS, PARTS, TOPS, Body
+from viewer.rigs.retargeting.body_parts import ARMS, LEG, PARTS, TOPS, Body
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skin import owners, strongest_influences
 
-# Points of the skin, between which a person has about 3 cm, and those of a hand that are kept
-# outside the others.
-_POINTS, _HAND_POINTS = 2000, 24
+# Points of the skin of a person, whose area is about the height squared, 3 cm from each other.
+# Stout figures have more; hands are chosen from so many times as many.
+_POINTS, _MOST, _DENSER = 2000, 3000, 4
+_HAND_POINTS = 48  # those of a hand that are kept outside the others
 _BLUNT = 0.04  # radius of the end of a hand that comes along a ray
 # Winding number between that of points of a closed skin, 1/2, and of an open sheet, 0.
 _SOLID = 0.25
@@ -43,8 +44,10 @@ class SkinPoints:
     """(P,). 0 and 1 for points of the arms, as of ``ARMS``, else -1."""
     parts: Ints
     """(P,). 0 for points of upper arms, 1 of forearms, 2 of hands, -1 for all others."""
-    hands: Ints
-    """(P,). As ``arms``, for the points that are kept outside the skin."""
+    skin: Ints
+    """Rows of the points of the skin."""
+    hands: tuple[Ints, ...]
+    """Rows of the points of each hand that are kept outside the skin."""
     regions: dict[str, Bools]
     """(P,) each. Whether points are around the bones of a part, by the first name in ``PARTS``."""
     area: float
@@ -62,7 +65,13 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
     area = 0.5 * float(np.linalg.norm(vectors, axis=1).sum())
     if not area > 0.0:
         return None
-    samples = sample_surface(mesh.positions, mesh.triangles, _POINTS)
+    rest = rest_joints(figure)
+    top = next(joints[name] for name in TOPS if name in joints)
+    trunk = rest[top] - rest[joints["pelvis"]]
+    leg = np.diff(rest[[joints[name] for name in LEG]], axis=0)
+    height = float(np.linalg.norm(trunk) + np.linalg.norm(leg, axis=1).sum())
+    count = int(np.clip(_POINTS * area / max(height, 1e-30) ** 2, _POINTS, _MOST))
+    samples = sample_surface(mesh.positions, mesh.triangles, _DENSER * count)
     points = samples.positions
     from_middle = mesh.positions[mesh.triangles[:, 0]] - mesh.positions.mean(axis=0)
     outward = np.sign(np.einsum("ta,ta->", from_middle, vectors))
@@ -75,9 +84,9 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
     strongest[owners(skin)[influences]] = skin.joints[influences]
     movers = strongest[nearest]
     is_bound = movers >= 0
+    is_skin = (np.arange(len(points)) % _DENSER == 0)[is_bound]
     movers, points, normals = movers[is_bound], points[is_bound], normals[is_bound]
     parents = figure.require_skeleton().parents
-    rest = rest_joints(figure)
     arms, hands, parts = np.full((3, len(movers)), -1)
     for number, arm in enumerate(ARMS):
         shoulder, elbow, wrist = (joints[name] for name in arm)
@@ -88,19 +97,26 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
         reach = np.linalg.norm(rest[wrist] - rest[elbow])
         is_hand = descendants(parents, wrist)[movers]
         hands[is_hand & (np.linalg.norm(points - rest[wrist], axis=1) < reach)] = number
-    if not {0, 1} <= set(hands.tolist()):
+    every = np.flatnonzero(is_skin)
+    if not {0, 1} <= set(hands.tolist()) or not len(every):
         return None
-    kept = np.flatnonzero((hands >= 0) | encloses(points, normals, area / _POINTS, points))
+    some = every[:: max(round(len(every) / _POINTS), 1)]
+    piece = area / count * len(every) / len(some)
+    is_solid = encloses(points[some], normals[some], piece, points[every])
+    chosen = [every[is_solid | (hands[every] >= 0)]]
+    for number in range(len(ARMS)):
+        rows = np.flatnonzero(hands == number)
+        chosen.append(rows[_spread(points[rows], _HAND_POINTS)])
+    kept = np.unique(np.concatenate(chosen))
     kept = kept[np.argsort(movers[kept], kind="stable")]
-    movers, arms, hands, parts = movers[kept], arms[kept], hands[kept], parts[kept]
+    skin_rows, *ends = (np.flatnonzero(np.isin(kept, rows)).astype(np.int32) for rows in chosen)
+    movers, arms, parts = movers[kept], arms[kept], parts[kept]
     points, normals = points[kept], normals[kept]
     crown = None
     if "head" in joints:
         own = descendants(parents, joints["head"])[movers]
-        top = next(joints[name] for name in TOPS if name in joints)
-        trunk = unit(rest[top] - rest[joints["pelvis"]])
         if own.any():
-            crown = float(np.quantile((points[own] - rest[joints["head"]]) @ trunk, 0.98))
+            crown = float(np.quantile((points[own] - rest[joints["head"]]) @ unit(trunk), 0.98))
     regions = {"pelvis": arms < 0}
     if "head" in joints:
         regions["head"] = descendants(parents, joints["head"])[movers]
@@ -117,7 +133,8 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
     places = np.einsum("pab,pb->pa", bind[:, :3, :3], points) + bind[:, :3, 3]
     normals = unit(np.einsum("pab,pb->pa", bind[:, :3, :3], normals))
     return SkinPoints(
-        movers.astype(np.int32), places, normals, arms, parts, hands, regions, area / _POINTS, crown
+        movers.astype(np.int32), places, normals, arms, parts, skin_rows, tuple(ends), regions,
+        area / count, crown,
     )  # fmt: skip
 
 
@@ -160,15 +177,10 @@ class Solid:
     def __init__(self, points: SkinPoints, body: Body) -> None:
         self.points, self.body = points, body
         self.area = points.area / body.height**2
+        """Area of the piece of the skin at each point."""
         self.place = body.chains.place[points.joints]
-        every = [np.flatnonzero(points.hands == number) for number in range(len(ARMS))]
-        self.hands = [
-            np.sort(rows[_spread(points.places[rows], _HAND_POINTS)]).astype(np.int32)
-            for rows in every
-        ]
         self.regions = {
-            name: np.flatnonzero(each)[::2].astype(np.int32)
-            for name, each in points.regions.items()
+            name: points.skin[each[points.skin]][::2] for name, each in points.regions.items()
         }
 
     def posed(self, rows: Ints, points: Ints) -> tuple[Floats, Floats]:

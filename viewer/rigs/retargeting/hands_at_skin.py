@@ -35,8 +35,7 @@ from viewer.rigs.retargeting.person_skin import UNSURE, Person, nearness_of
 _FADE, _STEADY, _POWER = 0.3, 0.08, 8
 _LITTLE = 0.01  # weight of the place that is known without the skin
 NONE = 1e-4  # shifts that are no change
-_DISC = 0.012  # radius of the piece of the skin around a point
-_FEWER = 4  # of so many points, one counts for whether another is inside
+_WHOLE = 400  # points that decide whether another is inside, at least
 _DEEP = 0.2  # distance up to which skin is near a hand: half the width of a stout body
 # Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
 # edge of something thin, or of an open mesh, the nearest point is aside.
@@ -88,7 +87,7 @@ def shifts_at_skin(
         farthest = 0.0
         for skin in near:
             number, rows = skin.number, skin.rows
-            step = _steps(skin, result, arms, _FEWER * solid.area, gaps, sides)
+            step = _steps(skin, result, arms, solid.area, gaps, sides)
             length = lengths_of(step)
             # The next curve starts from this one, so that steps which it smooths do not add up.
             part = np.where(length > NONE, touches[number, rows], 0.0)
@@ -191,21 +190,20 @@ class _Arms:
             self.offsets[arm, :, 1] = bent - np.einsum("rab,rb->ra", lower, elbow)
             self.offsets[arm, :, 2] = shift
 
-    def moved(
-        self, arm: int, rows: Ints, parts: Ints, points: Floats, normals: Floats
-    ) -> tuple[Floats, Floats]:
-        """Return points and normals (R, P, 3) of the skin, of which some parts (R, P) are an arm's.
+    def moved(self, arm: int, rows: Ints, parts: Ints, points: Floats) -> Floats:
+        """Return points (R, P, 3) of the skin, of which some parts (R, P) are those of an arm.
 
         All are where they are without changes of the arms.
         """
         if (parts < 0).all():
-            return points, normals
+            return points
         index = np.searchsorted(self.rows, rows)[:, None]
-        linear, offsets = self.linear[arm, index, parts], self.offsets[arm, index, parts]
-        return (
-            np.einsum("rpab,rpb->rpa", linear, points) + offsets,
-            np.einsum("rpab,rpb->rpa", linear, normals),
-        )
+        return self.turned(arm, rows, parts, points) + self.offsets[arm, index, parts]
+
+    def turned(self, arm: int, rows: Ints, parts: Ints, normals: Floats) -> Floats:
+        """Return normals likewise."""
+        index = np.searchsorted(self.rows, rows)[:, None]
+        return np.einsum("rpab,rpb->rpa", self.linear[arm, index, parts], normals)
 
     def within_reach(self, arm: int, rows: Ints, steps: Floats) -> Floats:
         """Return steps (R, 3) of a wrist: straight arms can only swing about the shoulder."""
@@ -239,18 +237,20 @@ class _NearSkin:
     """(R, P, 3). Rows with fewer points have some that are far from everything."""
     whole: Singles
     """(2, R, S, 3). Points and normals of the skin without the hand's arm, in single precision."""
+    area: float
+    """Area of the piece of the skin at each of these."""
 
 
 def _near(
     solid: Solid, number: int, rows: Ints, shifts: Floats, arms: _Arms
 ) -> Iterator[_NearSkin]:
     """Yield batches of rows of a hand that is moved by shifts (N, 3), with the skin near it."""
-    others = np.flatnonzero(solid.points.arms != number).astype(np.int32)
+    others = solid.points.skin[solid.points.arms[solid.points.skin] != number]
     for batch in batches(rows):
-        own = solid.posed(batch, solid.hands[number])[0]
+        own = solid.posed(batch, solid.points.hands[number])[0]
         points, normals = solid.posed(batch, others)
         parts = np.broadcast_to(solid.points.parts[others], points.shape[:2])
-        moved, _ = arms.moved(1 - number, batch, parts, points, normals)
+        moved = arms.moved(1 - number, batch, parts, points)
         ends = own + shifts[batch, None]
         centres = ends.mean(axis=1, keepdims=True)
         reach = lengths_of(ends - centres).max(axis=1, keepdims=True) + _DEEP
@@ -261,10 +261,11 @@ def _near(
         # Those that are near come first.
         order = np.argsort(~is_near, axis=1, kind="stable")[:, : is_near.sum(axis=1).max()]
         near = np.where(is_near[each, order][..., None], points[each, order], _NOWHERE)
-        whole = np.stack([points, normals])[:, :, ::_FEWER].astype(np.float32)
+        some = slice(None, None, max(len(others) // _WHOLE, 1))
+        whole = np.stack([points, normals])[:, :, some].astype(np.float32)
         yield _NearSkin(
             number, batch[holds], own[holds], parts[each, order][holds], near[holds],
-            normals[each, order][holds], whole[:, holds],
+            normals[each, order][holds], whole[:, holds], some.step * solid.area,
         )  # fmt: skip
 
 
@@ -273,14 +274,15 @@ def _steps(
 ) -> Floats:
     """Return translations (R, 3) of a hand to its gaps from the skin near it.
 
-    ``area``: of the pieces of the whole skin.
+    ``area``: of the piece of the skin at each point.
     """
     number, rows, parts = skin.number, skin.rows, skin.parts
     own, each = skin.own + shifts[number, rows, None], np.arange(len(rows))[:, None]
-    others, normals = arms.moved(1 - number, rows, parts, skin.points, skin.normals)
+    others = arms.moved(1 - number, rows, parts, skin.points)
     squares = np.einsum("rpa,rpa->rp", others, others)[:, None]
     nearest = (squares - 2.0 * own @ others.swapaxes(1, 2)).argmin(axis=2)
-    away, outward = own - others[each, nearest], normals[each, nearest]
+    part, away = parts[each, nearest], own - others[each, nearest]
+    outward = arms.turned(1 - number, rows, part, skin.normals[each, nearest])
     heights = np.einsum("rha,rha->rh", away, outward)
     distances = lengths_of(away)
     aside = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
@@ -290,10 +292,13 @@ def _steps(
     unsure = np.flatnonzero(deep.any(axis=1))
     if len(unsure):
         whole, normals_there = skin.whole[:, unsure]
-        is_enclosed = encloses(whole, normals_there, area, own[unsure])
-        is_inside[unsure] &= ~deep[unsure] | is_enclosed
+        # The deep points of each row come first.
+        most = deep.sum(axis=1).max()
+        at = unsure[:, None], np.argsort(~deep[unsure], axis=1, kind="stable")[:, :most]
+        is_inside[at] &= ~deep[at] | encloses(whole, normals_there, skin.area, own[at])
     # Points of the skin are discs as wide as the distances between them.
-    clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - _DISC, 0.0)))
+    disc = np.sqrt(area / np.pi)
+    clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - disc, 0.0)))
     each, first = each[:, 0], clear.argmin(axis=1)
     missing = np.maximum(gaps[number, rows, None] - clear, 0.0)
     # What is farther is another part than the source's hand touches.
@@ -301,7 +306,7 @@ def _steps(
     near = falling((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))
     pull = -(near * excess)[:, None] * unit(away[each, first])
     # The mean direction out, on the side of the part on which the hand is.
-    part = parts[each[:, None], nearest][..., None]
+    part = part[..., None]
     trunk, hand = (sides[number, rows, None, which] for which in (0, 1))
     ways = np.where(part < 0, trunk, np.where(part > 0, hand, 0.0))
     inwards = np.minimum(np.einsum("rha,rha->rh", outward, ways), 0.0)
