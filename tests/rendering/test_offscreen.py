@@ -241,12 +241,12 @@ def test_repeated_rendering_does_not_leak_memory():
     """
     code = """
 sizes = []
-for i in range(181):
+for i in range(131):
     if i % 10 == 0:
         scene = Scene([Actor(figure), Actor(arm(2))])
     scene.actors[0].pose.dofs[4] = 0.01 * i
     viewer.render(scene, (64 + i % 2, 48), options=DisplayOptions(show=('skin', 'both')[i % 2]))
-    if i % 75 == 30:
+    if i % 50 == 30:
         sizes.append(resident())
 first, second, third = sizes
 print(min(second - first, third - second))

@@ -119,7 +119,7 @@ def test_bundled_body_with_correctives_and_shape_matches_the_reference(ctx, how,
     figure = viewer.load(bundled_body()).actors[0].figure
     assert figure.correctives is not None
     instances = Instances(ctx, figure, way)
-    actors = cast(figure, 5, reach=0.6)
+    actors = cast(figure, 3, reach=0.6)
     for actor in actors:
         actor.pose.shape_weights = np.zeros(figure.n_shapes)
     check(instances, actors, how)
