@@ -44,6 +44,7 @@ _REACH = 1.0
 _NARROWER = 0.8  # radius of a limb relative to that of the hub, below which it has its own joint
 # Distance from the hub, relative to its radius, at which the only limb begins at the latest.
 _TAPERED = 2.0
+_SUDDEN = 2.0  # length in which the radius falls at a step, relative to the difference
 # Distance of a path from the middle of a level set, relative to the half width, from which it is
 # beside it, as in a plate that a limb meets in its middle; and the least length and half width of
 # such a part at the end of a limb, relative to the half width of the limb, that is a plate.
@@ -333,6 +334,13 @@ def _beginning(field: _Field, rows: Ints, parting: float, wide: float, is_inner:
         narrow = np.flatnonzero(field.radii[rows] <= np.sqrt(thick * wide))
         far = np.flatnonzero(field.distances[rows] >= _TAPERED * wide)
         reached = min(int(narrow[0]), int(far[0]) if len(far) else len(rows) - 1)
+        # A stem begins at the surface of its pot, where the radius has fallen to its own as fast as
+        # the surface comes nearer. Radii are known to half a voxel.
+        half = 0.5 * field.solid.spacing
+        thin = int(np.flatnonzero(field.radii[rows] <= thick + half)[0])
+        fallen = float(field.radii[rows[reached]] - field.radii[rows[thin]])
+        if field.distances[rows[thin]] - field.distances[rows[reached]] <= _SUDDEN * fallen:
+            reached = max(reached, thin)
     return reached
 
 

@@ -134,8 +134,12 @@ def _blunt_end(solid: Solid, paths: Paths, tree: Tree) -> tuple[Ints, bool]:
     from scipy.sparse import csgraph
 
     hub = int(tree.rows[0])
-    ways = csgraph.dijkstra(paths.steps, indices=[int(tree.routes[0][-1])], min_only=True)
-    end, beyond = int(ways.argmax()), ways >= ways[hub]
+    (limb,) = (chain for chain in tree.chains if chain.start == 0)
+    (outer,) = solid.nearest(limb.points[-1:]).tolist()
+    ways, inner = csgraph.dijkstra(paths.steps, indices=[outer, hub])
+    # What is nearer to the end of the limb is beyond it: the other branches of a plant.
+    beyond = (ways >= ways[hub]) & (ways >= inner)
+    end = int(np.where(beyond, ways, -1.0).argmax())
     (found,) = paths.to(np.array([hub]), np.array([end]))
     if end == hub:
         return found, False
