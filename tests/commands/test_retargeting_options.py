@@ -61,7 +61,13 @@ def test_note_about_feet_far_from_the_ground_ends_when_they_are_moved_there(walk
     rows = "\n".join(["0 " * 21] * 2)
     walk.write_text(f"{head}\n{rows}\n")
     assert convert(walk, "low.bvh") == 0
-    assert "below height 0, as those of walk do; --ground of " in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "below height 0, as those of walk do; --ground of " in said
+    # Notes do not repeat the file of the line above; warnings do.
+    lines = [line for line in said.splitlines() if line.startswith(("note: ", "warning: "))]
+    named = [str(walk) in line for line in lines]
+    assert len(lines) > 3 and named[0]
+    assert named[1:] == [line.startswith("warning: ") for line in lines[1:]]
     assert convert(walk, "ground.bvh", "--ground") == 0
     told = capsys.readouterr()
     assert "--ground" not in told.err and "body: raised by " in told.out

@@ -259,9 +259,21 @@ def begin_scene(options: SceneOptions) -> tuple[Scene, list[Builder]]:
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warning") -> None:
-    """Print a line per warning or note, ``plain`` for strings, unless the run is recorded."""
-    # Errors in a file that was opened nevertheless are warnings.
+    """Print a line per warning or note, ``plain`` for strings, unless the run is recorded.
+
+    Notes do not repeat the file of the line above.
+    """
+    named = ""
     for warning in warnings:
-        if not note_found(warning, plain):
-            severity = warning.severity if isinstance(warning, Diagnostic) else plain
-            print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)
+        if note_found(warning, plain):
+            continue
+        found = warning if isinstance(warning, Diagnostic) else None
+        place = "" if found is None else found.place
+        if (plain if found is None else found.severity) != "note":
+            # Errors in a file that was opened nevertheless are warnings.
+            print(f"warning: {warning}", file=sys.stderr)
+        elif found is not None and place == named != "":
+            print(f"note:   {found.message}", file=sys.stderr)
+        else:
+            print(f"note: {warning}", file=sys.stderr)
+        named = place
