@@ -93,7 +93,10 @@ def test_usage_error_is_one_line(arguments, capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize("words", [["--up", "-z"], ["--up=-z"], ["--up", "-y"]])
 def test_negative_axis_may_follow_a_space(words, rig, capsys):
     assert run(["info", *words, *map(str, rig)]) == 0
-    assert capsys.readouterr().err == ""
+    # The axis has been understood, and no file of a rig needs one.
+    axis = words[-1][-2:]
+    told = "no effect: no file is a capture, BVH, OBJ or PLY"
+    assert capsys.readouterr().err == f"note: --up {axis} has {told}\n"
 
 
 @pytest.mark.parametrize(
