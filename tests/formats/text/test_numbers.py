@@ -132,7 +132,7 @@ def test_single_invalid_number_is_refused():
 
 @pytest.mark.slow
 @given(st.lists(st.text("0123456789.+-eEf_x \n\x00\u0663", max_size=20), max_size=10))
-@settings(max_examples=400)
+@settings(max_examples=200)
 def test_parsing_of_blocks_and_single_words_agrees(parts):
     data = " ".join(parts).encode()
     single = [to_number(word) for word in data.split()]
