@@ -553,7 +553,8 @@ def test_corners_of_a_cut_are_no_limbs():
 def test_long_limb_stays_at_the_wide_base_of_a_later_junction():
     def is_distinct(depth, *necks):
         """Return whether a protrusion up to 1 is, with necks 0.1 wide at these distances."""
-        field = SimpleNamespace(_widths=np.array([0.1]), _depths=np.array([depth]))
+        solid = SimpleNamespace(spacing=0.01)
+        field = SimpleNamespace(_widths=np.array([0.1]), _depths=np.array([depth]), solid=solid)
         found = Protrusion(0, 1.0, 0.5, (1,), tuple((neck, (0,)) for neck in necks))
         return limb_tree._Field._is_distinct(field, found)
 

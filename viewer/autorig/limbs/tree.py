@@ -183,7 +183,9 @@ class _Field:
         # first junction may be with a bump of the limb itself, such as a corner of its foot.
         for junction, base in found.necks:
             width = float(self._widths[list(base)].max())
-            is_round = float(self._depths[list(base)].max()) >= _ROUND * width
+            # Radii are known to half a voxel.
+            depth = float(self._depths[list(base)].max()) + 0.5 * self.solid.spacing
+            is_round = depth >= _ROUND * width
             if found.tip - junction >= (_STOUT if is_round else _LONG) * width:
                 return True
         return False
