@@ -27,12 +27,11 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rigs.arrays import Bools, Floats, Ints
-from viewer.rigs.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rigs.geometry.rotation import axis_rotations, nearest_angles, quaternion_to_matrix
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import path_to_root
 from viewer.rigs.kinematics import world_matrices
-from viewer.rigs.pose import Pose, dof_rotations
-from viewer.rigs.posing.joint_rotation import nearest_dofs, rotation_dofs
+from viewer.rigs.pose import Pose
 from viewer.rigs.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 _CLOSE = 1e-7  # error below which the target is reached, as a fraction of the chain's length
@@ -248,7 +247,9 @@ class Reaching:
             raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
         rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
         self._rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
-        self._skeleton, self._start, start = skeleton, pose.copy(), pose.copy()
+        # Full turns change nothing, except in rules that make rotations of several DOFs.
+        self._has_turns = skeleton.posing is None
+        start = pose.copy()
         self._dofs = start.dofs
         self._kinds = skeleton.dof_kinds[self._rows] - FIRST_ROTATION
         self._axes = np.eye(3)[self._kinds]
@@ -404,17 +405,11 @@ class Reaching:
         Steps past gimbal lock, and a target that circles, add turns without limit. Keys of such
         DOFs would spin the joint.
         """
-        dofs, skeleton = self._dofs.copy(), self._skeleton
-        wound = self._rows[np.abs(dofs - self._start.dofs)[self._rows] > np.pi]
-        if not len(wound) or skeleton.posing is not None:
-            return dofs
-        rotations = dof_rotations(skeleton, dofs)
-        for joint in np.unique(skeleton.dof_joints[wound]).tolist():
-            rotation = quaternion_to_matrix(self._start.rotations[joint]) @ rotations[joint]
-            near = nearest_dofs(skeleton, self._start, joint, rotation)
-            if near.error < _APART:
-                rows = rotation_dofs(skeleton, joint)
-                dofs[rows] = near.dofs[rows]
+        dofs, values = self._dofs.copy(), self._dofs[self._rows]
+        if self._has_turns:
+            near = nearest_angles(values, self._first.values)
+            is_inside = (near >= self._low) & (near <= self._high)
+            dofs[self._rows] = np.where(is_inside, near, values)
         return dofs
 
     def _left(self, state: _State) -> float:
