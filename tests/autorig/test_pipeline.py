@@ -291,7 +291,7 @@ def test_weights_that_tear_when_a_joint_rotates_are_reported():
     )
     figure = replace(figure, skin=skin)
     (line,) = torn()
-    assert line.labelled.startswith("warning: the mesh may tear where it moves with tip: rotated")
+    assert line.labelled.startswith("warning: the mesh may tear when tip rotates: at 60°, vertices")
     assert_allclose(figure.mesh.positions[line.places, 1].min(), 1.7)
     assert_allclose(figure.mesh.positions[line.places, 1].max(), 1.8)
     ends, pulled = [line.values["one"], line.values["other"]], []

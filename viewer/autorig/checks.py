@@ -117,7 +117,7 @@ def check_lines(
 
 
 def _torn_lines(figure: Figure, pose: Pose) -> Iterator[Diagnostic]:
-    """Return a message about places that tear when a joint rotates from the pose of the target.
+    """Yield a warning of places that tear when a joint rotates from the pose of the target.
 
     Where neighbours have the weights a and b of all joints below one at the distance r, and it
     rotates by t about the worst axis, they move apart by 2 |a - b| r sin(t / 2).
@@ -140,7 +140,7 @@ def _torn_lines(figure: Figure, pose: Pose) -> Iterator[Diagnostic]:
     gaps = 2.0 * np.sin(0.5 * _BEND) * np.abs(steps.data) * arms
     size = box_size(bounding_box(positions))
     torn = np.flatnonzero((gaps > _GAP * size) & (gaps > _LONGER * lengths[rows]))
-    # An edge may tear by several joints of a chain: the one that tears it most is named.
+    # Several joints of a chain may tear an edge: the one that tears it most is named.
     torn = torn[np.argsort(-gaps[torn], kind="stable")]
     torn = torn[np.unique(rows[torn], return_index=True)[1]]
     numbers = np.bincount(joints[torn], minlength=count)
@@ -151,15 +151,15 @@ def _torn_lines(figure: Figure, pose: Pose) -> Iterator[Diagnostic]:
     named = np.unique(joints[torn])
     named = named[np.argsort(-numbers[named], kind="stable")]
     yield Diagnostic(
-        "R018.torn: the mesh may tear where it moves with {joints}: rotated by 60°, {them} would "
-        "pull vertices up to {gap:.0%} of the size apart (vertices {one} and {other})",
+        "R018.torn: the mesh may tear when {joints} {rotate}: at 60°, vertices {one} and {other} "
+        "would move {gap:.0%} of its size apart",
         None,
         None,
         "weights",
         np.unique(links[rows[torn]]).astype(np.int32),
         {
             "joints": listed([joint_label(skeleton, joint) for joint in named.tolist()], 4),
-            "them": agree(len(named), "it", "they"),
+            "rotate": agree(len(named), "rotates", "rotate"),
             "gap": float(gaps[worst]) / size,
             "one": int(links[rows[worst], 0]),
             "other": int(links[rows[worst], 1]),
