@@ -94,13 +94,15 @@ def test_pair_opens_as_one_figure_in_any_order(files, order):
 def test_mesh_of_a_skin_in_a_file_of_its_own_is_shown_once(files, tmp_path):
     # The files of ``viewer rig MESH -o x.skel``.
     skel, skin = files("2.skel", "2.skin")
-    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0.25 0.75", "f 1/1 2/1 3/1"]
+    lines = ["# 2: z up, centimetres", "v 0 0 0", "v 1 0 0", "v 0 1 0"]
+    lines += ["vt 0.25 0.75", "f 1/1 2/1 3/1"]
     own, other = tmp_path / "own.obj", tmp_path / "other.obj"
     own.write_text("\n".join(lines))
-    other.write_text("\n".join(["v 0 0 0.1", *lines[1:]]))
+    other.write_text("\n".join([lines[0], "v 0 0 0.1", *lines[2:]]))
     for paths in ([skel, skin, own], [own, skel, skin]):
         (actor,) = viewer.load(*paths).actors
         assert actor.figure.is_attached and actor.figure.mesh.uvs is not None
+        assert (actor.figure.up, actor.figure.unit) == ("z", "cm")
     assert len(viewer.load(skel, skin, other).actors) == 2
 
 

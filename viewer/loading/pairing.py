@@ -112,5 +112,15 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         )
     facts = tuple(fact for figure in figures for fact in figure.facts)
     origins = (*figures[0].origins, *figures[1].origins)
-    # A mesh from a file of its own has materials and texture coordinates.
-    return Figure(paths[1].stem, figures[-1].mesh, skeleton, skin, facts=facts, origins=origins)
+    # A mesh from a file of its own has materials and texture coordinates, an up axis and a unit.
+    last = figures[-1]
+    return Figure(
+        paths[1].stem,
+        last.mesh,
+        skeleton,
+        skin,
+        up=last.up,
+        unit=last.unit,
+        facts=facts,
+        origins=origins,
+    )
