@@ -42,6 +42,7 @@ from viewer.rigs.comparison.steps import FrameRange
 from viewer.rigs.figure import figure_pose
 from viewer.rigs.motion.clip import Clip, suits
 from viewer.rigs.motion.sampled_animation import sample_animation
+from viewer.rigs.motion.upright import own_up
 from viewer.rigs.scalars import length_unit
 from viewer.rigs.scene import Actor, Motion, Scene, scene_of
 from viewer.rigs.skinning import Skinning
@@ -51,6 +52,7 @@ from viewer.streams import require_stdout, summary_stream
 if TYPE_CHECKING:
     from viewer.schemas import ComparisonData, DiffData, DifferenceData, PoseErrorData
 
+_UNUSED = "F007.unused-"  # keys of notes that an option had no effect
 _DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
 _N_RANKS = 3  # ranks of clips for an actor: same name, the actor's own clip, any other clip
@@ -158,20 +160,22 @@ def run(arguments: argparse.Namespace) -> int:
         return load(*arguments.common, *input_files(text), motion=settings)
 
     reference = open_one(arguments.reference)
-    print_warnings(reference.diagnostics)
     skinning = settings_of(Skinning, arguments)
     rows: list[Comparison] = []
     heats: list[_Heat] = []
     inputs += reference.files
+    said = reference.diagnostics
     for name in arguments.files:
         try:
             other = open_one(name)
             inputs += other.files
+            said = _unless_used(said, other)
             row, heat = _compared(name, reference, other, skinning, arguments.poses, span)
         except ViewerError as problem:
             row, heat = Comparison(name, error=printable(problem, 500)), None
         rows.append(row)
         heats += [] if heat is None else [heat]
+    print_warnings(said)
     stream = sys.stdout if output is None else summary_stream(output)
     if output is not None:
         check_targets([output], inputs, arguments.force)
@@ -268,19 +272,45 @@ def _compared(
     found: list[tuple[Actor, Difference]] = []
     errors: list[PoseErrors | str] = []
     for first, second in pairing.pairs:
+        notes = _notes_on_pair(reference, other, first, second, is_choice)
         # Comparing poses the reference, which must start in the same pose for each input.
         posed = first.copy()
         with shown_progress(f"comparing {Path(name).name}"):
             difference = compare(posed, second.copy(), skinning, n_poses, frames)
             errors.append(_pose_errors(first, second, frames))
-        if is_choice and first.figure.name != second.figure.name:
-            paired_with = note("D002.partner: compared with {name}", name=brief(second.name))
-            difference = replace(difference, notes=(paired_with, *difference.notes))
-        found.append((posed, difference))
+        found.append((posed, replace(difference, notes=(*notes, *difference.notes))))
     differences = tuple((actor.name, difference) for actor, difference in found)
-    lone = _lone(name, pairing)
-    row = Comparison(name, differences, lone, "", other.diagnostics, tuple(errors))
+    lone, said = _lone(name, pairing), _unless_used(other.diagnostics, reference)
+    row = Comparison(name, differences, lone, "", said, tuple(errors))
     return row, _heat_of(name, found)
+
+
+def _unless_used(said: tuple[Diagnostic, ...], other: Scene) -> tuple[Diagnostic, ...]:
+    """Return what was said about one scene without options that had an effect on the other."""
+    unused = {found.key for found in other.diagnostics}
+    return tuple(
+        found for found in said if not found.key.startswith(_UNUSED) or found.key in unused
+    )
+
+
+def _notes_on_pair(
+    reference: Scene, other: Scene, first: Actor, second: Actor, is_choice: bool
+) -> tuple[Diagnostic, ...]:
+    """Return notes on the names and up axes of a pair."""
+    notes = []
+    if is_choice and first.figure.name != second.figure.name:
+        notes.append(note("D002.partner: compared with {name}", name=brief(second.name)))
+    # A figure in a motion is upright along the axis of the motion, whatever its own one.
+    ups = own_up(reference, first)[0], own_up(other, second)[0]
+    if ups[0] != ups[1]:
+        notes.append(
+            note(
+                "D002.up: up axes differ ({first} and {second}): compared without conversion",
+                first=ups[0],
+                second=ups[1],
+            )
+        )
+    return tuple(notes)
 
 
 def _pose_errors(reference: Actor, found: Actor, frames: FrameRange | None) -> PoseErrors | str:

@@ -1,13 +1,18 @@
 """Pairing of figures by ``viewer diff``."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+import viewer
+from viewer.cli import run
 from viewer.commands.diff import pair_actors
 from viewer.rigs.captures.points import PointLayout
 from viewer.rigs.figure import Figure
 from viewer.rigs.mesh import Mesh
 from viewer.rigs.motion.clip import Channel, Clip
-from viewer.rigs.scene import Actor
+from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.skin import skin_from_lists
 
@@ -138,3 +143,22 @@ def test_clip_with_a_different_name_is_used_only_if_necessary():
         "s (a skeleton)",
         "motion run",
     )
+
+
+@pytest.mark.parametrize(("up", "expected"), [("z", []), ("y", ["D002.up"])])
+def test_up_axes_are_those_in_the_scene_whatever_the_figures_own(up, expected):
+    """A motion with z up drives a body with y up, and a file of it states z."""
+    driven = Scene([rig("a")], world_up=up)
+    read = Scene([replace(rig("a"), figure=replace(rig("a").figure, up="z"))])
+    ((_, found),) = viewer.diff(driven, read, poses=0).differences
+    assert [note.key for note in found.notes] == expected
+
+
+def test_option_that_only_one_of_both_files_needs_has_an_effect(tmp_path, capsys):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    mesh, copy = str(tmp_path / "a.obj"), str(tmp_path / "a.glb")
+    assert run(["convert", mesh, "-o", copy, "--unit", "cm"]) == 0
+    for files, count in (((mesh, copy), 0), ((copy, mesh), 0), ((copy, copy), 2)):
+        capsys.readouterr()
+        assert run(["diff", *files, "--unit", "cm"]) == 0
+        assert capsys.readouterr().err.count("note: --unit cm has no effect") == count

@@ -132,14 +132,6 @@ class _Comparison:
         self._pair_meshes()
         self._pair_points()
         self.notes += content_notes(first.figure, second.figure)
-        if first.figure.up != second.figure.up:
-            ups = {"first": first.figure.up, "second": second.figure.up}
-            self.notes.append(
-                Diagnostic(
-                    "D002.up: up axes differ ({first} and {second}): compared without conversion",
-                    values=ups,
-                )
-            )
         self.factor = self._unit_factor()
 
     def _unit_factor(self) -> float:
