@@ -327,14 +327,18 @@ def rigged(evaluate_rig, truth, template: Figure, is_quadruped: bool):
 
 
 def _posed(evaluate_rig, truth, rig) -> dict[str, list[np.ndarray]]:
-    """Return the vertices in each of the five poses, by the artist's rig and ours."""
+    """Return the vertices in each of the five poses, by the artist's rig and ours.
+
+    Like ``evaluate_rig.compare``, it rotates only joints that both have: many artists' rigs have no
+    wrists.
+    """
     is_quadruped = "fup_l" in truth["sem"]
     frame = evaluate_rig.frame(truth["J"], truth["sem"], is_quadruped)
-    found = {}
+    common, found = truth["sem"].keys() & rig["sem"].keys(), {}
     for name, pose in evaluate_rig.poses(frame, is_quadruped).items():
         found[name] = []
         for body in (truth, rig):
-            turned = {body["sem"][key]: turn for key, turn in pose.items() if key in body["sem"]}
+            turned = {body["sem"][key]: turn for key, turn in pose.items() if key in common}
             moves = evaluate_rig.globals_(body["J"], body["parents"], turned)
             found[name].append(evaluate_rig.lbs(truth["V"], body["W"], moves))
     return found
