@@ -16,7 +16,7 @@ from viewer.rigs.mesh import Mesh
 from viewer.rigs.motion.evaluation import frames_of, world_frames
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.retargeting.body_parts import Body
+from viewer.rigs.retargeting.body_joints import Body
 from viewer.rigs.retargeting.drive import Drive
 from viewer.rigs.retargeting.driven_clip import driven_clip
 from viewer.rigs.retargeting.driven_hands import hand_notes, keep_hands

@@ -31,11 +31,12 @@ from viewer.rigs.motion.evaluation import rest_translations_of
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.motion.timing import Timing
 from viewer.rigs.pose import rest_pose
-from viewer.rigs.retargeting.body_parts import (
+from viewer.rigs.retargeting.body_joints import (
     ARMS,
     FEET,
     LEG,
     PARTS,
+    THIGHS,
     TOPS,
     Body,
     bones,
@@ -44,7 +45,7 @@ from viewer.rigs.retargeting.body_parts import (
     within_reach,
 )
 from viewer.rigs.retargeting.figure_skin import Solid, points_of
-from viewer.rigs.retargeting.hands_at_skin import NONE, shifts_at_skin
+from viewer.rigs.retargeting.hands_at_skin import UNCHANGED, shifts_at_skin
 from viewer.rigs.retargeting.person_skin import Person
 from viewer.rigs.retargeting.retarget import Retargeted
 from viewer.rigs.scalars import length_text
@@ -130,7 +131,7 @@ def keep_hands(
         ]
     up = axis_vector(figure.up) * (-1.0 if found.source.hangs else 1.0)
     lifts = _lifts(body, other, found, skin, up, shifts)
-    if not touches and max(float(np.abs(shifts).max()), float(lifts.max())) < NONE:
+    if not touches and max(float(np.abs(shifts).max()), float(lifts.max())) < UNCHANGED:
         return given, None
     shifts = [shift + lift[:, None] * up for shift, lift in zip(shifts, lifts, strict=True)]
     joints = body.chains.joints
@@ -338,7 +339,7 @@ def _radii(figure: Figure, joints: dict[str, int], height: float) -> dict[str, f
         return {}
     vertices, strongest = owners(skin), strongest_influences(skin)
     points, result = rest_joints(figure), {}
-    for start, end in PARTS[1:]:
+    for start, end in THIGHS:
         own = vertices[strongest[skin.joints[strongest] == joints[start]]]
         bone = points[joints[end]] - points[joints[start]]
         length = float(np.linalg.norm(bone))

@@ -15,7 +15,7 @@ from viewer.rigs.geometry.samples import sample_surface
 from viewer.rigs.geometry.vectors import unit
 from viewer.rigs.hierarchy import descendants
 from viewer.rigs.mesh import area_vectors
-from viewer.rigs.retargeting.body_parts import ARMS, LEG, PARTS, TOPS, Body
+from viewer.rigs.retargeting.body_joints import ARMS, LEG, THIGHS, TOPS, Body
 from viewer.rigs.shape import rest_joints
 from viewer.rigs.skin import owners, strongest_influences
 
@@ -49,7 +49,7 @@ class SkinPoints:
     hands: tuple[Ints, ...]
     """Rows of the points of each hand that are kept outside the skin."""
     regions: dict[str, Bools]
-    """(P,) each. Whether points are around the bones of a part, by the first name in ``PARTS``."""
+    """(P,) each. Whether points are around the bones of a part, as ``region_of`` names it."""
     area: float
     """Area of the piece of the skin at each point."""
     crown: float | None
@@ -121,7 +121,7 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
     if "head" in joints:
         regions["head"] = descendants(parents, joints["head"])[movers]
         regions["pelvis"] &= ~regions["head"]
-    for hip, knee in PARTS[1:]:
+    for hip, knee in THIGHS:
         is_leg = descendants(parents, joints[hip])[movers]
         regions[hip] = is_leg
         # The trunk ends at the hips.
@@ -141,8 +141,9 @@ def points_of(figure: Figure, joints: dict[str, int]) -> SkinPoints | None:
 def encloses(
     skin: Floats | Singles, normals: Floats | Singles, area: float, points: Floats
 ) -> Bools:
-    """Return which points (..., P, 3) are inside a skin with an area at each of (..., S, 3): (P,).
+    """Return which points (..., P, 3) are inside a skin, (..., P).
 
+    ``skin``, ``normals``: (..., S, 3), points of it, each in the middle of a piece with an area.
     The winding number (Barill et al. 2018) sums the solid angles of all pieces of the skin, as
     fractions of the sphere: 1 inside, 0 outside. It is 1/2 at a point of a closed skin, or of one
     with small openings, but 0 at one of an open sheet, such as a cape.
@@ -179,6 +180,8 @@ class Solid:
         self.area = points.area / body.height**2
         """Area of the piece of the skin at each point."""
         self.place = body.chains.place[points.joints]
+        """(P,). Places of the points' joints in ``Body.world``."""
+        # The end of a hand is wide enough to meet one of half of the points.
         self.regions = {
             name: points.skin[each[points.skin]][::2] for name, each in points.regions.items()
         }
@@ -199,7 +202,10 @@ class Solid:
         return placed, normals
 
     def radii(self, region: str, starts: Floats, ways: Floats, needed: Bools) -> Floats:
-        """Return how far a blunt hand that comes along rays stops from their starts: (N,)."""
+        """Return how far from the starts of rays (N, 3) a blunt hand meets the skin: (N,).
+
+        NaN where it meets none, and in rows that are not needed.
+        """
         result, rows = np.full(len(starts), np.nan), np.flatnonzero(needed).astype(np.int32)
         for chosen in batches(rows if len(self.regions[region]) else rows[:0]):
             away = self.posed(chosen, self.regions[region])[0] - starts[chosen, None]

@@ -15,10 +15,10 @@ from viewer.rigs.feet.legs import bend, hinges, unscaled
 from viewer.rigs.geometry.rotation import quaternion_to_matrix
 from viewer.rigs.geometry.vectors import lengths_of, unit
 from viewer.rigs.motion.timing import Timing
-from viewer.rigs.retargeting.body_parts import (
+from viewer.rigs.retargeting.body_joints import (
     ARMS,
     EXTENDED,
-    PARTS,
+    TRUNK,
     Body,
     bones,
     from_bone,
@@ -29,12 +29,12 @@ from viewer.rigs.retargeting.body_parts import (
 from viewer.rigs.retargeting.figure_skin import Singles, Solid, batches, encloses
 from viewer.rigs.retargeting.person_skin import UNSURE, Person, nearness_of
 
-# Lengths of the smooth curve of a hand's shift to the skin, seconds: where it does not
-# touch, and where it does. A power of the contact lies between them, so that hands that only come
-# near do not bend the curve.
+# Lengths of the smooth curve of a hand's shift to the skin, seconds: where it does not touch, and
+# where it does. A power of the contact lies between them, so that hands that only come near do not
+# bend the curve.
 _FADE, _STEADY, _POWER = 0.3, 0.08, 8
 _LITTLE = 0.01  # weight of the place that is known without the skin
-NONE = 1e-4  # shifts that are no change
+UNCHANGED = 1e-4  # shifts that are no change
 _WHOLE = 400  # points that decide whether another is inside, at least
 _DEEP = 0.2  # distance up to which skin is near a hand: half the width of a stout body
 # Cosine of the angle to the normal of the nearest point from which a point is inside. Beyond the
@@ -54,10 +54,11 @@ def shifts_at_skin(
 ) -> Floats:  # fmt: skip
     """Return smooth shifts (2, N, 3) of wrists with which hands keep the gaps of the source.
 
+    ``to_target``: (3, 3), from the axes of the source, ``other``, to those of the figure.
     ``shifts``: (2, N, 3), those that are known without the skin.
     """
     aims = _aims(body, solid, other, person, to_target, shifts)
-    # Ways out: from the trunk, and from the other forearm and hand where the hands touch.
+    # Directions out: from the trunk, and from the other forearm and hand where the hands touch.
     apart, together = other.between_wrists() @ to_target.T, together_in(other)
     across = np.where(together[:, None] > 0.0, unit(apart), 0.0)
     trunk = [_side(other, number) @ to_target.T for number in range(len(ARMS))]
@@ -90,7 +91,7 @@ def shifts_at_skin(
             step = _steps(skin, result, arms, solid.area, gaps, sides)
             length = lengths_of(step)
             # The next curve starts from this one, so that steps which it smooths do not add up.
-            part = np.where(length > NONE, touches[number, rows], 0.0)
+            part = np.where(length > UNCHANGED, touches[number, rows], 0.0)
             wished = part[:, None] * (result[number, rows] + step)
             targets[number, rows] = (1.0 - part)[:, None] * targets[number, rows] + wished
             farthest = max(farthest, float((part * length).max()))
@@ -100,7 +101,7 @@ def shifts_at_skin(
         half = np.where(is_crossed, 0.5 * together, 0.0)[:, None] * (apart - found)
         targets += np.stack([-half, half])
         farthest = max(farthest, float(lengths_of(half).max()))
-        if farthest < NONE:
+        if farthest < UNCHANGED:
             break
         result = _faded(body, targets, pulls, timing)
         arms.bend(result)
@@ -152,7 +153,7 @@ def _faded(body: Body, targets: Floats, pulls: Floats, timing: Timing) -> Floats
 
 def _side(other: Body, number: int) -> Floats:
     """Return the direction of a wrist from the nearest bone of the trunk: (N, 3)."""
-    trunk = pairwise([name for name in PARTS[0] if name in other.place])
+    trunk = pairwise([name for name in TRUNK if name in other.place])
     ways = np.stack([from_bone(other, ARMS[number][2], *bone)[0] for bone in trunk])
     nearest = np.linalg.norm(ways, axis=2).argmin(axis=0)
     side: Floats = unit(ways[nearest, np.arange(ways.shape[1])])
@@ -201,12 +202,12 @@ class _Arms:
         return self.turned(arm, rows, parts, points) + self.offsets[arm, index, parts]
 
     def turned(self, arm: int, rows: Ints, parts: Ints, normals: Floats) -> Floats:
-        """Return normals likewise."""
+        """Return the normals (R, P, 3) at such points."""
         index = np.searchsorted(self.rows, rows)[:, None]
         return np.einsum("rpab,rpb->rpa", self.linear[arm, index, parts], normals)
 
-    def within_reach(self, arm: int, rows: Ints, steps: Floats) -> Floats:
-        """Return steps (R, 3) of a wrist: straight arms can only swing about the shoulder."""
+    def swung(self, arm: int, rows: Ints, steps: Floats) -> Floats:
+        """Return steps (R, 3) of a wrist; those of straight arms swing about the shoulder."""
         index = np.searchsorted(self.rows, rows)
         shoulder, elbow, wrist = (each[index] for each in self.joints[arm])
         longest = _ALMOST * EXTENDED * (lengths_of(elbow - shoulder) + lengths_of(wrist - elbow))
@@ -255,17 +256,17 @@ def _near(
         centres = ends.mean(axis=1, keepdims=True)
         reach = lengths_of(ends - centres).max(axis=1, keepdims=True) + _DEEP
         is_near = lengths_of(moved - centres) < reach
-        holds, each = np.flatnonzero(is_near.any(axis=1)), np.arange(len(own))[:, None]
+        holds, row = np.flatnonzero(is_near.any(axis=1)), np.arange(len(own))[:, None]
         if not len(holds):
             continue
         # Those that are near come first.
         order = np.argsort(~is_near, axis=1, kind="stable")[:, : is_near.sum(axis=1).max()]
-        near = np.where(is_near[each, order][..., None], points[each, order], _NOWHERE)
+        near = np.where(is_near[row, order][..., None], points[row, order], _NOWHERE)
         some = slice(None, None, max(len(others) // _WHOLE, 1))
         whole = np.stack([points, normals])[:, :, some].astype(np.float32)
         yield _NearSkin(
-            number, batch[holds], own[holds], parts[each, order][holds], near[holds],
-            normals[each, order][holds], whole[:, holds], some.step * solid.area,
+            number, batch[holds], own[holds], parts[row, order][holds], near[holds],
+            normals[row, order][holds], whole[:, holds], some.step * solid.area,
         )  # fmt: skip
 
 
@@ -274,15 +275,16 @@ def _steps(
 ) -> Floats:
     """Return translations (R, 3) of a hand to its gaps from the skin near it.
 
-    ``area``: of the piece of the skin at each point.
+    ``area``: of the piece of the skin at each point; ``gaps``: (2, N), of the hands; ``sides``:
+    (2, N, 2, 3), directions in which the hands are from the trunk, and from the other hand.
     """
     number, rows, parts = skin.number, skin.rows, skin.parts
-    own, each = skin.own + shifts[number, rows, None], np.arange(len(rows))[:, None]
+    own, row = skin.own + shifts[number, rows, None], np.arange(len(rows))[:, None]
     others = arms.moved(1 - number, rows, parts, skin.points)
     squares = np.einsum("rpa,rpa->rp", others, others)[:, None]
     nearest = (squares - 2.0 * own @ others.swapaxes(1, 2)).argmin(axis=2)
-    part, away = parts[each, nearest], own - others[each, nearest]
-    outward = arms.turned(1 - number, rows, part, skin.normals[each, nearest])
+    part, away = parts[row, nearest], own - others[row, nearest]
+    outward = arms.turned(1 - number, rows, part, skin.normals[row, nearest])
     heights = np.einsum("rha,rha->rh", away, outward)
     distances = lengths_of(away)
     aside = np.sqrt(np.maximum(distances**2 - heights**2, 0.0))
@@ -299,21 +301,21 @@ def _steps(
     # Points of the skin are discs as wide as the distances between them.
     disc = np.sqrt(area / np.pi)
     clear = np.where(is_inside, heights, np.hypot(heights, np.maximum(aside - disc, 0.0)))
-    each, first = each[:, 0], clear.argmin(axis=1)
+    row, first = row[:, 0], clear.argmin(axis=1)
     missing = np.maximum(gaps[number, rows, None] - clear, 0.0)
     # What is farther is another part than the source's hand touches.
-    excess = clear[each, first] - gaps[number, rows]
+    excess = clear[row, first] - gaps[number, rows]
     near = falling((excess - _PULL[0]) / (_PULL[1] - _PULL[0]))
-    pull = -(near * excess)[:, None] * unit(away[each, first])
+    pull = -(near * excess)[:, None] * unit(away[row, first])
     # The mean direction out, on the side of the part on which the hand is.
     part = part[..., None]
     trunk, hand = (sides[number, rows, None, which] for which in (0, 1))
     ways = np.where(part < 0, trunk, np.where(part > 0, hand, 0.0))
     inwards = np.minimum(np.einsum("rha,rha->rh", outward, ways), 0.0)
     way = unit(np.einsum("rh,rha->ra", missing, outward - inwards[..., None] * ways))
-    cosine = np.maximum(np.einsum("ra,ra->r", way, outward[each, first]), 0.5)
-    push = np.minimum(missing[each, first] / cosine, _FAST)[:, None] * way
+    cosine = np.maximum(np.einsum("ra,ra->r", way, outward[row, first]), 0.5)
+    push = np.minimum(missing[row, first] / cosine, _FAST)[:, None] * way
     # Of two hands, each gives way by half.
-    give = np.where(part[each, first, 0] == 2, 0.5, 1.0)
-    step = give[:, None] * np.where((missing[each, first] > 0.0)[:, None], push, pull)
-    return arms.within_reach(number, rows, step)
+    give = np.where(part[row, first, 0] == 2, 0.5, 1.0)
+    step = give[:, None] * np.where((missing[row, first] > 0.0)[:, None], push, pull)
+    return arms.swung(number, rows, step)

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rigs.arrays import Floats
 from viewer.rigs.feet.curves import falling
 from viewer.rigs.geometry.vectors import unit
-from viewer.rigs.retargeting.body_parts import ARMS, PARTS, TOPS, Body
+from viewer.rigs.retargeting.body_joints import ARMS, TOPS, TRUNK, Body
 
 # Gaps between a wrist of the motion and the skin of a part, relative to the height: up to the
 # first, it is at the part, beyond the second it is not. A person's wrist is 0.03 to 0.07 away with
@@ -43,11 +43,15 @@ _Capsule = tuple[Floats, Floats, float, float]
 
 
 class Person:
-    """Gaps between the hands of a motion and the person's skin, estimated from the joints."""
+    """Gaps between the hands of a motion and the person's skin, estimated from the joints.
+
+    They are relative to the height, and in the order of ``ARMS``.
+    """
 
     def __init__(self, body: Body, tips: list[int]) -> None:
         self.regions = _capsules(body)
         self.wrist: list[dict[str, Floats]] = []
+        """Gaps (N,) of each wrist from the skin of each region."""
         hands, arms = [], []
         for arm, tip in zip(ARMS, tips, strict=True):
             shoulder, elbow, wrist = (body.at(name) for name in arm)
@@ -73,6 +77,7 @@ class Person:
             points += [wrist + x * along + y * aside for x, y in _ASIDE]
             hands.append(np.min([_gap(point, every) for point in points], axis=0) - _HAND)
         self.hand = np.stack(hands)
+        """(2, N). Gaps of hands from the skin, below 0 inside of it."""
         self.touches: Floats = falling((self.hand - _TOUCHING) / (_OFF - _TOUCHING))
         """(2, N). How much hands touch the body, 0 to 1."""
         gaps = np.stack([np.min(list(each.values()), axis=0) for each in self.wrist])
@@ -83,7 +88,7 @@ class Person:
 def _capsules(body: Body) -> dict[str, list[_Capsule]]:
     """Return the capsules of a person's trunk with the head, and of each thigh."""
     top = next(name for name in TOPS if name in body.place)
-    spine = [name for name in PARTS[0][: PARTS[0].index(top) + 1] if name in body.place]
+    spine = [name for name in TRUNK[: TRUNK.index(top) + 1] if name in body.place]
     rest = [body.rest[body.place[name], :3, 3] for name in spine]
     lengths = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     reached = np.append(0.0, np.cumsum(lengths)) / max(float(lengths.sum()), 1e-30)

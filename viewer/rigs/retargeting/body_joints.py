@@ -1,4 +1,4 @@
-"""Parts of a body and its arms by meaning, and where the wrists are from them in a motion."""
+"""Joints of a body by meaning, and where the wrists are from its parts in a motion."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.skeleton import Skeleton
 
 # Parts of the body as chains of joints; the bones between those that are matched count.
-PARTS = (
-    ("pelvis", "spine1", "spine2", "spine3", "neck", "head", "crown"),
-    ("left_hip", "left_knee"), ("right_hip", "right_knee"),
-)  # fmt: skip
+TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head", "crown")
+THIGHS = (("left_hip", "left_knee"), ("right_hip", "right_knee"))
+PARTS = (TRUNK, *THIGHS)
 # The right side first: so elbows bend the other way than knees, see ``hinges``.
 ARMS = tuple(
     tuple(f"{side}_{part}" for part in ("shoulder", "elbow", "wrist")) for side in ("right", "left")
@@ -37,7 +36,11 @@ _CROWN = 0.15
 
 
 class Body:
-    """Joints of a body by meaning, in all rows of a motion, without its place and scale."""
+    """Joints of a body by meaning, in all rows of a motion, without its place and scale.
+
+    ``rests``: (2, J, 3), rest translations and scales of the skeleton; ``others``: joints to pose
+    besides; ``crown``: its height above the head's joint, figure units, if it is known.
+    """
 
     def __init__(
         self,
@@ -48,26 +51,30 @@ class Body:
         others: Iterable[int] = (),
         crown: float | None = None,
     ) -> None:
-        self.rests, self.chains = rests, chains_to(skeleton, [*joints.values(), *others])
+        self.chains = chains_to(skeleton, [*joints.values(), *others])
         self.place = {name: int(self.chains.place[joint]) for name, joint in joints.items()}
+        """Places of the joints among those of the chains, C of them, by meaning."""
         self.rest = rest_worlds(skeleton, self.chains, rests)
+        """(C, 4, 4). Joints at rest, figure units."""
         # A scale or place of the whole figure changes nothing between the parts of its body.
         own = replace(clip, figure_scales=None, figure_translations=None)
         self.world = chain_worlds(own, self.chains, *rests)
+        """(N, C, 4, 4). Joints in the rows of the motion, figure units."""
         top = next(name for name in TOPS if name in joints)
         pelvis, neck, *leg = (self.rest[self.place[name], :3, 3] for name in ("pelvis", top, *LEG))
         limb = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()
         self.height = float(np.linalg.norm(neck - pelvis) + limb)
+        """From ankles to neck, figure units: what other lengths are relative to."""
         # The crown is a point of the head, in the direction of the trunk at rest.
         self.trunk = unit(neck - pelvis)
-        self._head = self.rest[self.place["head"]] if "head" in joints else None
-        if self._head is not None:
+        if "head" in joints:
+            head = self.rest[self.place["head"], :3, :3]
             length = _CROWN * self.height if crown is None else crown
-            self._crown = np.linalg.pinv(self._head[:3, :3]) @ (length * self.trunk)
+            self._crown = np.linalg.pinv(head) @ (length * self.trunk)
             self.place["crown"] = self.place["head"]
 
     def axes(self, name: str) -> tuple[Floats, Floats]:
-        """Return the ways, (N, 3), that are up and forwards at rest, as a joint turns them."""
+        """Return where up and forwards at rest point, rotated with a joint: unit vectors (N, 3)."""
         left = self.rest[self.place["left_hip"], :3, 3] - self.rest[self.place["right_hip"], :3, 3]
         rest = np.stack([self.trunk, unit(np.cross(left, self.trunk))], axis=1)
         place = self.place[name]
@@ -94,7 +101,7 @@ def bones(joints: dict[str, int]) -> Iterator[tuple[str, str]]:
 
 def region_of(start: str, end: str) -> str:
     """Return the part of the body around a bone: trunk, head or a thigh, by its first joint."""
-    return "head" if end == "crown" else "pelvis" if start in PARTS[0] else start
+    return "head" if end == "crown" else "pelvis" if start in TRUNK else start
 
 
 def from_bone(body: Body, wrist: str, start: str, end: str) -> tuple[Floats, Floats]:
