@@ -14,6 +14,7 @@ import viewer
 from viewer.cli import run
 from viewer.linting import SEVERITIES, lint_files
 from viewer.loading import MotionSettings, bundled_body, load
+from viewer.phrases import in_window
 
 GOOD, SMPL = skin_text.GOOD, synthetic_smpl.model("smpl")
 PIG = pig_text.GOOD["skinning_weights.txt"]
@@ -199,6 +200,9 @@ def test_up_axis_and_unit_may_be_stated_for_meshes(tmp_path, suffix):
         assert (figure.up, figure.unit) == expected
         told = [f"{path}: --up -y applies to motions only: y up"]
         assert list(scene.warnings) == (told if settings.get("up") == "-y" else [])
+    with in_window():
+        (said,) = load(path, motion=MotionSettings(up="-z")).warnings
+    assert said == f"{path}: Up axis -z applies to motions only: z up"
     assert unused(bundled_body(), up="z", unit="cm") == ["F007.unused-unit", "F007.unused-up"]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._source import Source
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import vertex_normals
@@ -216,7 +216,10 @@ def axis_and_unit(source: Source, comment: str) -> tuple[Up, str]:
     asked = source.option("up")
     if asked.startswith("-"):
         source.warn(
-            "F007.up-sign: --up {up} applies to motions only: {used} up", up=asked, used=asked[1:]
+            "F007.up-sign: {option} {up} applies to motions only: {used} up",
+            option=Remedy("Up axis", "--up"),
+            up=asked,
+            used=asked[1:],
         )
     is_z = asked.endswith("z") if asked else re.search(r"\bz up\b", comment) is not None
     stated = re.search(r"\b[yz] up, (\w+)", comment)

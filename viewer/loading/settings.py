@@ -45,7 +45,7 @@ class MotionSettings:
         "length unit of BVH, OBJ and PLY files (default: estimated in BVH, else unknown)",
         choices=METRES,
     )
-    """Lengths are converted from it to metres."""
+    """Lengths of BVH files are converted from it to metres; those of meshes stay in it."""
     flat_hands: bool | None = None
     """Whether hand components are relative to the flat hand; None for the model's convention."""
     layout: str = setting(
