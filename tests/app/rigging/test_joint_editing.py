@@ -434,6 +434,7 @@ def test_motions_that_are_opened_drive_the_edited_rig(drive, tmp_path):
         (actor,) = hand.state.scene.actors
         assert hand.state.scene is not before
         assert actor.drive is not None and actor.figure is edited
+        assert hand.state.paths == (motion,)  # of the motion before, no file is left
         assert [one.text for one in unsaved_edits(hand.state)] == ["arm: rig"]
     save_export(hand.state, tmp_path / "arm.glb")
     hand.finish_job()

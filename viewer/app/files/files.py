@@ -138,7 +138,8 @@ class Loader(ThreadJob):
             place = self._opened[0] if self._opened else Path(self._rig.name)
             opened = Contents([(place, self._rig)], files=self._opened)
         figures = opened.figures
-        kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
+        kept = {path for path, _ in (*figures, *opened.morphs)}
+        kept |= set(self._opened if self._rig is not None else ())
         morphs = [*opened.morphs, *contents.morphs]
         joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
         joined.used_options = (contents.used_options or set()) | (opened.used_options or set())
@@ -342,7 +343,8 @@ def open_files(state: AppState, paths: Sequence[Path]) -> None:
     # Motions drive the rig that is shown, also before a file contains it.
     shown, own = [actor.figure for actor in state.scene.actors if actor.visible], None
     if len(shown) == 1 and state.of(SavedWork).lacks_rig(shown[0]):
-        own, opened = shown[0], state.paths
+        moved = {actor.clip_origin[0] for actor in state.scene.actors if actor.clip_origin}
+        own, opened = shown[0], tuple(path for path in state.paths if path not in moved)
     rig, files.rig = files.rig, ""
     settings = MotionSettings(up=files.up, rig=rig, springs=True)
     files.loader = Loader(paths, attempts, files.wake, settings, opened, own)
