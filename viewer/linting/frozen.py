@@ -120,7 +120,9 @@ def _is_keyed(subject: Subject, first: int, last: int, track: Track) -> bool:
         return True
     start, end = track.times[[first, last]] - subject.actor.offset
     count = (last - first) // track.per_frame - 1
-    return any(
-        ((channel.times > start) & (channel.times < end)).sum() >= _KEYED * count
-        for channel in clip.channels
+    every = (
+        [channel.own_times for channel in clip.channels]
+        if clip.kind == "transforms"
+        else [channel.times for channel in clip.channels]
     )
+    return any(((times > start) & (times < end)).sum() >= _KEYED * count for times in every)

@@ -89,6 +89,48 @@ def test_steps_jump_at_their_keys(joints):
     assert_allclose([angle(joints, "step", t) for t in (0.499, 0.501)], [0.0, 40.0], atol=1e-4)
 
 
+def write_waves(folder: Path, frames: np.ndarray) -> Path:
+    """Write joints with a key per frame at 24 fps; one angle is wrapped into -180 to 180."""
+    times = " ".join(f"{number / 24:.12g}" for number in range(len(frames)))
+    waves = {f"wave{n}": 60.0 * np.sin(0.1 * n * frames + n) for n in range(1, 6)}
+    waves["wheel"] = (5.0 * frames + 180.0) % 360.0 - 180.0
+    curves = {
+        name: (times, " ".join(f"{angle:.6f}" for angle in angles), 4, "")
+        for name, angles in waves.items()
+    }
+    path = write_joints(folder, curves, (len(frames) - 1) / 24.0)
+    # The joints have a size, as checks of motions need it.
+    place = 'Properties70: { P: "Lcl Translation", "Lcl Translation", "", "A",0,10,0 }'
+    head = '"Model::wheel", "LimbNode" { Version: 232'
+    text = path.read_text()
+    assert head in text
+    path.write_text(text.replace(head, f"{head}\n{place}"))
+    return path
+
+
+def test_samples_between_frames_do_not_change_the_rate(tmp_path, capsys):
+    path = write_waves(tmp_path, np.arange(61.0))
+    (actor,) = viewer.load(path).actors
+    clip = actor.figure.animations[0].clip()
+    (wheel,) = [each for each in clip.channels if each.key_times is not None]
+    # At frame 36, the wheel returns from 175 to -180 degrees within a frame, in steps of 45.
+    assert len(wheel.times) == len(wheel.own_times) + 7
+    assert clip.frame_rate == 24.0
+    assert run(["info", str(path)]) == 0
+    assert "keys from 0 to 2.5 s at 24 fps" in capsys.readouterr().out
+    output = tmp_path / "waves.bvh"
+    assert run(["convert", str(path), "-o", str(output)]) == 0
+    assert "Frames: 61\nFrame Time: 0.0416666" in output.read_text()
+
+
+def test_frozen_frames_are_found_at_the_rate_of_the_file(tmp_path):
+    frames = np.arange(61.0)
+    assert "C021" not in {each.code for each in lint_files([write_waves(tmp_path, frames)])[1]}
+    frames[20:30] = 19.0
+    found = [each for each in lint_files([write_waves(tmp_path, frames)])[1] if each.code == "C021"]
+    assert [each.frames.tolist() for each in found] == [list(range(20, 30))]
+
+
 def test_blend_shapes_of_the_oldest_version_move(tmp_path):
     path = tmp_path / "quad.fbx"
     path.write_text(QUAD_5000)

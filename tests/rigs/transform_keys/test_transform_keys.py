@@ -195,6 +195,33 @@ def test_frame_rate_is_estimated_from_the_keys(times, rate):
     assert key_rate(clip) == pytest.approx(rate, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("times", "rate", "regular"),
+    [
+        # The first usual rate whose frames hold these keys is 30.
+        ([0.0, 1.0, 1.5], 24.0, True),
+        # A motion recorded at 30 per second in a scene of 24; two keys there are as regular.
+        (np.arange(31) / 30.0, 30.0, True),
+        ([0.0, 0.1, 1.0], 24.0, False),
+        ([0.0, 0.1, 0.2345], 24.0, False),
+    ],
+)
+def test_stated_rate_counts_frames_unless_most_frames_of_another_rate_have_keys(
+    times, rate, regular
+):
+    moved = channel(0, "translation", times, np.zeros((len(times), 3)))
+    clip = replace(clip_of(moved), stated_rate=24.0)
+    assert (key_rate(clip), is_regular(clip)) == (rate, regular)
+
+
+def test_keys_added_by_a_reader_do_not_count_as_frames():
+    own = np.arange(10) / 30.0
+    times = np.append(own, 5.5 / 30.0)
+    moved = channel(0, "translation", np.sort(times), np.zeros((11, 3)))
+    assert key_rate(clip_of(moved)) == 60.0
+    assert key_rate(clip_of(replace(moved, key_times=own))) == 30.0
+
+
 def test_keys_at_irregular_times_are_recognised():
     regular, odd = np.arange(9) / 120.0, np.array([0.0, 0.1, 0.2345])
     clips = [

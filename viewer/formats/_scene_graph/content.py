@@ -262,6 +262,8 @@ class NodeAnimation:
     """JSON pointer to it; empty for files without JSON."""
     extras: Any = None
     """Application data, as parsed from JSON; None if there is none."""
+    rate: float | None = None
+    """Frames per second that the file states; None if it states none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -280,6 +282,8 @@ class NodeChannel:
     """``"step"``, ``"linear"`` or ``"cubic"``."""
     tangents: Floats | None = None
     """Incoming and outgoing slopes per second, (N, 2, C); only for ``"cubic"``."""
+    key_times: Floats | None = None
+    """Seconds of the file's own keys, if the reader added others between them: (K,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -67,11 +67,14 @@ def animations_of(
                     channel.interpolation,
                     channel.tangents,
                     shapes,
+                    channel.key_times,
                 ),
             )
         each = animations[number]
         played = tuple(channels.values())
-        return TransformClip(each.name, played, each.start, each.end, each.extras, number)
+        return TransformClip(
+            each.name, played, each.start, each.end, each.extras, number, each.rate
+        )
 
     return tuple(
         Animation(each.name, each.start, each.end, partial(clip, number), each.pointer, number)

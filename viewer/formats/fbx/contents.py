@@ -75,6 +75,7 @@ _SECONDS_PER_STEP = 2.0  # seconds added to the time limit for each step
 _MEMORY = 4 << 30  # bytes that the child may use for the smallest files
 _MEMORY_PER_BYTE = 64  # bytes added for each byte of the file
 _WORKER = "viewer.formats.fbx.worker"
+_OWN = ".own"  # suffix of the name of an array with the times of the file's own keys
 
 
 def node_file(source: Source) -> NodeFile:
@@ -369,6 +370,7 @@ def _animations(source: Source, told: Json) -> tuple[NodeAnimation, ...]:
             stack["end"],
             frozenset(stack["nodes"]),
             partial(_channels, source, told, meshes, number),
+            rate=told["rate"],
         )
         for number, stack in enumerate(told["stacks"])
     )
@@ -380,7 +382,9 @@ def _channels(
     """Sample one animation stack in another child process."""
     arrays, keys = _run_worker(source, str(stack))
     tracks = {each["keys"]: each for each in keys["keys"]}
-    _check_arrays(source, arrays, lambda name, row: _place_of_keys(told, tracks[name]))
+    _check_arrays(
+        source, arrays, lambda name, _: _place_of_keys(told, tracks[name.removesuffix(_OWN)])
+    )
     if keys["cut"]:
         source.warn(
             "F007.fbx-continued: {n} that {verb} before or after {their} keys {are} held after "
@@ -391,19 +395,27 @@ def _channels(
             are=agree(keys["cut"], "is", "are"),
         )
     channels: list[NodeChannel] = []
-    weights: dict[int, dict[int, Floats]] = {}  # weights by mesh, then by blend channel
+    # Weights and times of the file's own keys, by mesh, then by blend channel.
+    weights: dict[int, dict[int, tuple[Floats, Floats | None]]] = {}
     for each in keys["keys"]:
-        table = arrays[each["keys"]]
+        table, own = arrays[each["keys"]], arrays.get(each["keys"] + _OWN)
         if each["path"] == "weight":
             if each["element"] in meshes:
-                weights.setdefault(meshes[each["element"]], {})[each["element"]] = table
+                weights.setdefault(meshes[each["element"]], {})[each["element"]] = table, own
         else:
             values = table[:, 1:]
-            channels.append(NodeChannel(each["node"], each["path"], table[:, 0], values))
+            channels.append(
+                NodeChannel(each["node"], each["path"], table[:, 0], values, key_times=own)
+            )
     for at, tables in weights.items():
         mesh = told["meshes"][at]
-        times, values = _joined(tables, mesh["shapes"])
-        channels += [NodeChannel(node, "weights", times, values) for node in mesh["nodes"]]
+        times, values = _joined({key: table for key, (table, _) in tables.items()}, mesh["shapes"])
+        own = np.unique(
+            np.concatenate([table[:, 0] if own is None else own for table, own in tables.values()])
+        )
+        channels += [
+            NodeChannel(node, "weights", times, values, key_times=own) for node in mesh["nodes"]
+        ]
     return tuple(channels)
 
 

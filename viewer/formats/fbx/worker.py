@@ -43,6 +43,7 @@ _PHYSICAL = range(3, 11)  # values of ufbx.ShaderType from OSL standard surface 
 _PATHS = ("translation", "rotation", "scale")
 _STANDARD_RATE = 30.0  # frames per second of files that state none
 _RATES = (1.0, 1000.0)  # frame rates that files use
+_MILLISECONDS = 12  # value of ufbx.TimeMode of files that count milliseconds, not frames
 _JUMP = 1e-6  # time between the two samples on either side of a jump, seconds
 _LARGEST_ARC = 45.0  # maximum rotation between two samples, degrees
 _MOST_FRAMES = 20_000  # maximum number of frames for which a curve is continued
@@ -158,6 +159,7 @@ def _contents_of(kept: _Scene) -> Json:
     is_y_up = "target_axes" in kept.converted or int(kept.get(settings, "axes")[1]) != 4
     warnings = kept.items(metadata, "warnings")
     return {
+        "rate": _stated_rate(kept),
         "names": [str(kept.get(node, "name")) for node in nodes],
         "unit": 1.0 if is_metres else float(settings.unit_meters),
         "up": "y" if is_y_up else "z",
@@ -186,6 +188,14 @@ def _contents_of(kept: _Scene) -> Json:
             for stack in kept.items(scene, "anim_stacks")
         ],
     }
+
+
+def _stated_rate(kept: _Scene) -> float | None:
+    """Return the frames per second that the file states; None if it states no usable rate."""
+    settings = kept.get(kept.scene, "settings")
+    rate = float(settings.frames_per_second)
+    is_usable = _RATES[0] <= rate <= _RATES[1] and int(settings.time_mode) != _MILLISECONDS
+    return rate if is_usable else None
 
 
 def _moved(kept: _Scene, stack: Any, nodes: list[Any]) -> list[int]:
@@ -389,8 +399,7 @@ class _Sampled:
     def __init__(self, kept: _Scene, stack: Any) -> None:
         self.kept, self.animation = kept, kept.get(stack, "anim")
         self.start, self.end = float(stack.time_begin), float(stack.time_end)
-        rate = float(kept.get(kept.scene, "settings").frames_per_second)
-        self.rate = rate if _RATES[0] <= rate <= _RATES[1] else _STANDARD_RATE
+        self.rate = _stated_rate(kept) or _STANDARD_RATE
         self.told: list[Json] = []
         self.cut = 0
         # The animated properties of each element: their names and values.
@@ -404,7 +413,8 @@ class _Sampled:
     def result(self) -> Json:
         """Return the channels, ``"keys"``, and the number of curves that end early, ``"cut"``."""
         # A channel states its node or element, its path, and the name of its array: times in
-        # seconds and values, for linear interpolation, or slerp for rotations.
+        # seconds and values, for linear interpolation, or slerp for rotations. The times of the
+        # file's own keys follow in an array of their own, if there are others.
         self._add_nodes()
         self._add_weights()
         return {"keys": self.told, "cut": self.cut}
@@ -423,15 +433,17 @@ class _Sampled:
                 max_keyframe_segments=1024,
             )
         )
-        nodes = kept.items(kept.scene, "nodes")
+        nodes, of_file = kept.items(kept.scene, "nodes"), int(kept.ufbx.BakedKeyFlags.KEYFRAME)
         for moved in kept.items(baked, "nodes"):
             node = nodes[int(moved.typed_id)]
             values = self._values(node)
             further = self._further([value for _, value in values])
             for path in _PATHS:
                 keys = kept.get(moved, f"{path}_keys")
-                rows = [(key.time, *key.value) for key in (keys[i] for i in range(len(keys)))]
+                every = [keys[at] for at in range(len(keys))]
+                rows = [(key.time, *key.value) for key in every]
                 table = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
+                own = np.array([key.time for key in every if int(key.flags) & of_file])
                 extra = further
                 if path == "rotation":
                     turns = [value for name, value in values if name == "Lcl Rotation"]
@@ -444,7 +456,7 @@ class _Sampled:
                         more.append((time, *getattr(transform, path)))
                     table = np.concatenate([table.reshape(-1, len(more[0])), np.array(more)])
                     table = table[np.argsort(table[:, 0], kind="stable")]
-                self._put({"node": int(moved.typed_id), "path": path}, table)
+                self._put({"node": int(moved.typed_id), "path": path}, table, own)
 
     def _values(self, node: Any) -> list[tuple[str, Any]]:
         """Return the animated properties that move a node; helper nodes follow their parents."""
@@ -454,13 +466,15 @@ class _Sampled:
             found += self.animated.get(int(above.element_id), []) if above is not None else []
         return found
 
-    def _put(self, channel: Json, table: NDArray[np.float64]) -> None:
-        """Add a channel; if its value never changes, only the first key."""
+    def _put(self, channel: Json, table: NDArray[np.float64], own: _Times) -> None:
+        """Add a channel and the times of its own keys; if it is constant, only the first key."""
         if not len(table):
             return
         is_constant = not (table[:, 1:] != table[0, 1:]).any()
         name = f"keys{len(self.told)}"
         self.kept.arrays[name] = table[: 1 if is_constant else None]
+        if not is_constant and len(own) < len(table):
+            self.kept.arrays[f"{name}.own"] = own
         self.told.append({**channel, "keys": name})
 
     def _add_weights(self) -> None:
@@ -479,13 +493,14 @@ class _Sampled:
                         self._add_weight(channel, own)
 
     def _add_weight(self, channel: Any, values: list[Any]) -> None:
-        times = np.union1d(self._key_times(values), self._further(values))
+        own = self._key_times(values)
+        times = np.union1d(own, self._further(values))
         for low, high in self._curved(values):
             times = np.union1d(times, self._frames(low, high))
         weight = self.kept.ufbx.evaluate_blend_weight
         rows = [(time, weight(self.animation, channel, time)) for time in times.tolist()]
         table = np.array(rows, dtype=np.float64).reshape(-1, 2)
-        self._put({"element": int(channel.element_id), "path": "weight"}, table)
+        self._put({"element": int(channel.element_id), "path": "weight"}, table, own)
 
     def _curves(self, values: list[Any]) -> list[Any]:
         """Return the curves with keys of some animated properties."""

@@ -42,6 +42,7 @@ _ON_FRAME = 1e-3  # tolerance in frames
 _SINGLE = 2.0**-24  # relative rounding error of times, which files store in single precision
 _FASTEST = 1000.0  # keys that are closer are at irregular times
 _SLOWEST = 24.0  # keys that are further apart have frames between them
+_RECORDED = 0.5  # minimum fraction of frames with keys of a motion at another rate than stated
 _rates: Memo[TransformClip, float] = Memo()
 _tables: Memo[TransformClip, _TransformTable] = Memo(kept=1)
 
@@ -66,6 +67,8 @@ class TransformChannel:
     """(N, 2, C) or None. Incoming and outgoing slopes, per second; only for ``"cubic"``."""
     shapes: Ints | None = None
     """(C,) int32 or None. Blend shape of each component; only for ``"weights"``."""
+    key_times: Floats | None = None
+    """(K,) or None. Seconds of the file's own keys, if the reader added others between them."""
 
     def __post_init__(self) -> None:
         if self.path not in TRANSFORM_PATHS or self.interpolation not in INTERPOLATIONS:
@@ -81,9 +84,15 @@ class TransformChannel:
         if (self.shapes is not None) != (self.path == "weights"):
             raise RigError("shapes: expected for weights, and only there")
         freeze_fields(self, np.int32, shapes=(self.n_components,))
+        freeze_fields(self, key_times=(None,))
         if self.path == "rotation" and not self.values.any(axis=1).all():
             key = int(np.argmin(self.values.any(axis=1)))
             raise RigError(f"values of key {key}: expected a quaternion, found 0 0 0 0")
+
+    @property
+    def own_times(self) -> Floats:
+        """Seconds of the keys that the file has: (K,)."""
+        return self.times if self.key_times is None else self.key_times
 
     @property
     def n_components(self) -> int:
@@ -112,6 +121,8 @@ class TransformClip:
     """Application data of its file, as parsed from JSON; None if there is none."""
     number: int = -1
     """Index of its animation in the file, which may move several figures; -1 if unknown."""
+    stated_rate: float | None = None
+    """Frames per second that the file states; None if it states none."""
 
     def __post_init__(self) -> None:
         check_range(self, self.name, self.start, self.end)
@@ -128,7 +139,7 @@ class TransformClip:
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second of the keys; see ``key_rate``."""
+        """Frames per second; see ``key_rate``."""
         return key_rate(self)
 
     def sample(
@@ -458,20 +469,22 @@ def _components(path: str, channels: list[TransformChannel]) -> slice:
     return slice(start, start + sum(width for other, width in widths if other == path))
 
 
-# Rates, estimated from the times of the keys
+# Rates, stated by the file or estimated from the times of the keys
 
 
 def key_rate(clip: TransformClip) -> float:
-    """Return the first usual rate whose frames hold all keys, counted from the clip's start.
+    """Return the rate that the file states, or else one that is estimated from its keys.
 
-    Otherwise that of evenly spaced keys, multiplied to at least 24 per second; ``DEFAULT_RATE`` if
-    keys are irregular.
+    It is the first usual rate whose frames hold all keys, counted from the clip's start, or else
+    that of evenly spaced keys, multiplied to at least 24 per second; ``DEFAULT_RATE`` if keys are
+    irregular. It replaces a stated rate whose frames do not hold all keys if most frames have keys:
+    motions are saved in scenes of other rates than those at which they were recorded.
     """
-    return _regular_rate(clip) or DEFAULT_RATE
+    return _regular_rate(clip) or clip.stated_rate or DEFAULT_RATE
 
 
 def is_regular(clip: TransformClip) -> bool:
-    """Return whether all keys of a clip lie on frames of ``key_rate``."""
+    """Return whether all keys of a clip's file lie on frames of ``key_rate``."""
     return _regular_rate(clip) > 0.0
 
 
@@ -482,13 +495,24 @@ def _regular_rate(clip: TransformClip) -> float:
 
 def _estimated(clip: TransformClip) -> float:
     # Most channels of a file share their times.
-    lists = {channel.times.tobytes(): channel.times for channel in clip.channels}
+    every = [channel.own_times for channel in clip.channels]
+    lists = {times.tobytes(): times for times in every}
     times = np.unique(np.concatenate([np.array([clip.start]), *lists.values()]))
     rounding = _SINGLE * float(np.abs(times[[0, -1]]).max())
     since = times - clip.start
     if len(since) == 1:
         # A pose that is held for some frames: only the end of the range tells the rate.
         since = np.array([0.0, clip.end - clip.start])
+    if clip.stated_rate is not None:
+        if _is_on_frames(since, clip.stated_rate, rounding):
+            return clip.stated_rate
+        rate = _of_keys(since, rounding)
+        return rate if len(since) - 1 >= _RECORDED * rate * since[-1] else 0.0
+    return _of_keys(since, rounding)
+
+
+def _of_keys(since: Floats, rounding: float) -> float:
+    """Return the rate of keys at seconds since the start of their clip, increasing; see above."""
     for rate in (*_RATES, *_BROADCAST):
         if _is_on_frames(since, rate, rounding):
             return rate
