@@ -131,6 +131,18 @@ def test_frozen_frames_are_found_at_the_rate_of_the_file(tmp_path):
     assert [each.frames.tolist() for each in found] == [list(range(20, 30))]
 
 
+def test_frames_beside_keys_between_frames_are_exact(tmp_path):
+    # Frames 9 and 10 at 24 fps are at 0.375 and 0.417 s.
+    path = write_joints(tmp_path, {"ease": ("0 0.405 1", "0 90 0", 1032, "")}, 1.0)
+    (actor,) = viewer.load(path).actors
+    frames = np.arange(25)
+    # The curve states slopes of 0 (flags 8 and 1024), so an angle is 3 u^2 - 2 u^3 of the way at a
+    # fraction u of the time.
+    u = np.where(frames / 24.0 < 0.405, frames / 24.0 / 0.405, (1.0 - frames / 24.0) / 0.595)
+    found = [angle(actor, "ease", frame / 24.0) for frame in frames.tolist()]
+    assert_allclose(found, 90.0 * (3.0 * u**2 - 2.0 * u**3), atol=1e-4)
+
+
 def test_blend_shapes_of_the_oldest_version_move(tmp_path):
     path = tmp_path / "quad.fbx"
     path.write_text(QUAD_5000)

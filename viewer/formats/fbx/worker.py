@@ -5,9 +5,10 @@ an animation stack after the file, it returns the keys of that stack. It writes 
 and JSON under ``"json"``. Only some uses of ufbx's binding are safe: see ``_Scene``.
 
 ufbx bakes the curves of a stack, with their pivots and layers, at the file's frame rate and at
-their keys. Two things are added: samples before the first and after the last key of curves that
-continue there, and samples within frames in which a joint rotates so far that the shorter arc
-between two samples would be the wrong way round.
+their keys. Three things are added: samples before the first and after the last key of curves that
+continue there, samples at frames that ufbx leaves out beside keys between frames, and samples
+within frames in which a joint rotates so far that the shorter arc between two samples would be the
+wrong way round. So the motion is exact at the frames of the file.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ _PATHS = ("translation", "rotation", "scale")
 _STANDARD_RATE = 30.0  # frames per second of files that state none
 _RATES = (1.0, 1000.0)  # frame rates that files use
 _MILLISECONDS = 12  # value of ufbx.TimeMode of files that count milliseconds, not frames
+_ON_FRAME = 1e-3  # tolerance in frames
 _JUMP = 1e-6  # time between the two samples on either side of a jump, seconds
 _LARGEST_ARC = 45.0  # maximum rotation between two samples, degrees
 _MOST_FRAMES = 20_000  # maximum number of frames for which a curve is continued
@@ -444,7 +446,7 @@ class _Sampled:
                 rows = [(key.time, *key.value) for key in every]
                 table = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
                 own = np.array([key.time for key in every if int(key.flags) & of_file])
-                extra = further
+                extra = np.union1d(further, self._skipped(table[:, 0]))
                 if path == "rotation":
                     turns = [value for name, value in values if name == "Lcl Rotation"]
                     extra = np.union1d(extra, self._turning(turns, table[:, 0], extra))
@@ -552,6 +554,15 @@ class _Sampled:
             return np.array([start, end]) if end >= start else np.zeros(0)
         frames = np.arange(np.ceil(start * self.rate), np.floor(end * self.rate) + 1) / self.rate
         return np.unique([start, *frames, end])
+
+    def _skipped(self, baked: _Times) -> _Times:
+        """Return the frames that ufbx leaves out, next to keys between frames."""
+        frames = self._frames(baked[0], baked[-1])[1:-1] if len(baked) else baked
+        after = np.searchsorted(baked, frames)
+        gaps = (baked[after] - baked[after - 1]) * self.rate
+        # Longer gaps are constant, or straight lines.
+        is_skipped = (gaps > 1.0 + _ON_FRAME) & (gaps < 2.0 - _ON_FRAME)
+        return frames[is_skipped]
 
     def _further(self, values: list[Any]) -> _Times:
         """Return times that ufbx leaves out: beside steps, and where curves are extrapolated."""
