@@ -51,6 +51,7 @@ REQUIRED_BONES = (
 """Bones that every VRM character must have."""
 
 
+_FINGERS = ("Index", "Middle", "Ring", "Little")
 _ABOVE = {
     **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},
     **{"UpperLeg": "hips", "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Toes": "Foot"},
@@ -58,26 +59,22 @@ _ABOVE = {
     **{"Eye": "head", "jaw": "head"},
     **{"ThumbMetacarpal": "Hand", "ThumbProximal": "ThumbMetacarpal"},
     "ThumbDistal": "ThumbProximal",
+    **{f"{finger}Proximal": "Hand" for finger in _FINGERS},
+    **{f"{finger}Intermediate": f"{finger}Proximal" for finger in _FINGERS},
+    **{f"{finger}Distal": f"{finger}Intermediate" for finger in _FINGERS},
 }
-"""Required ancestor of each listed bone."""
+"""Required ancestor of each bone, without its side."""
 _ALL_ABOVE = {
     **{"neck": "upperChest", "leftShoulder": "upperChest", "rightShoulder": "upperChest"},
     **{"head": "neck", "leftUpperArm": "leftShoulder", "rightUpperArm": "rightShoulder"},
 }
 """Ancestors of bones in a complete skeleton, where optional bones are between required ones."""
-_FINGERS = ("Index", "Middle", "Ring", "Little")
-_PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
 
 
 def bone_above(bone: str) -> str:
-    """Return the required ancestor of a bone; empty for the hips."""
+    """Return the required ancestor of a bone; empty for the hips, and for names that are none."""
     side = next((side for side in ("left", "right") if bone.startswith(side)), "")
-    name = bone.removeprefix(side)
-    for finger in _FINGERS:
-        if side and name.startswith(finger):
-            above = _PHALANGES[name.removeprefix(finger)]
-            return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
-    found = _ABOVE.get(name, "")
+    found = _ABOVE.get(bone.removeprefix(side), "")
     return f"{side}{found}" if found[:1].isupper() else found
 
 

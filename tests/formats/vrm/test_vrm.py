@@ -67,6 +67,8 @@ def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
             {"leftLowerArm": 3},
             ['"leftLowerArm": expected a node below that of "leftUpperArm" (node 4), found node 3'],
         ),
+        # No human bones.
+        ({"leftIndexMetacarpal": 4, "leftIndex": 5, "rightTail": 3}, []),
     ],
 )
 def test_bones_below_another_than_their_own_parent_are_named(bones, said, tmp_path):
