@@ -117,8 +117,8 @@ class Matches:
 class Template:
     """The template's surface, aligned with the targets to match; ``RigError`` without triangles.
 
-    ``unfitted`` (V, 3): the surface in its own proportions, if the aligned one has others; it is
-    scaled to the same size.
+    ``unfitted`` (V, 3): the surface in its own proportions, if the aligned one has others, along
+    the same axes; it is scaled to the same size, the diagonal of its box.
     """
 
     def __init__(self, positions: Floats, triangles: Ints, unfitted: Floats | None = None) -> None:

@@ -95,7 +95,8 @@ def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, na
     plain, original, template = template, template.skeleton, met.figure
     aligned = alignment.similarity.apply(posed)
     # In the same pose, so that skin that is folded at a joint is not taken for squeezed skin.
-    unfitted = None if template is plain else deform(plain, met.pose)[0]
+    turn = alignment.similarity.rotation
+    unfitted = None if template is plain else deform(plain, met.pose)[0] @ turn.T
     with part_of_work(span=(0.4, 0.8)):
         weights = transferred_weights(
             Template(aligned, template.require_mesh().triangles, unfitted),
