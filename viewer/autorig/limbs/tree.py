@@ -34,9 +34,9 @@ PLATE = 4.0
 # Shortest limb: relative to the half width of its base, to the size, and in voxels. A bump is
 # wider than long.
 _OWN, _SHORTEST, _VOXELS = 1.0, 0.03, 3.0
-# Length of a limb relative to the half width of its neck, from which it is one wherever it is; and
-# that of a limb with a round neck, up to twice as wide as thick, whose radius is at least this
-# fraction of the half width: a thumb is one where the corner of a bird's tail is none.
+# Length of a limb relative to the half width of its neck, from which it is one wherever it is: of
+# any limb, and of one with a round neck, such as a thumb, unlike the flat corner of a bird's tail.
+# A neck is round if the radius in it is at least this fraction of its half width.
 _LONG, _STOUT, _ROUND = 3.0, 2.0, 0.5
 # A hub's reach relative to the solid's radius there: two branches that touch the same inscribed
 # ball are one.
@@ -178,7 +178,7 @@ class _Field:
         return is_long and not self._is_at_cut(found)
 
     def _is_distinct(self, found: Protrusion) -> bool:
-        """Return whether a protrusion is clearly longer than its neck at an earlier junction."""
+        """Return whether a protrusion is long for its width at one of its junctions."""
         # On a plate, as a leg of a table, the base of a later junction is a part of the plate. The
         # first junction may be with a bump of the limb itself, such as a corner of its foot.
         for junction, base in found.necks:
