@@ -486,6 +486,17 @@ def test_part_that_moves_with_a_distant_joint_is_found():
         assert all(sorted(one.vertices.tolist()) == island.tolist() for one in found)
 
 
+def test_part_is_not_distant_from_the_only_joint_that_moves_vertices():
+    """A mesh below a node moves with it, whatever its parts are; here one is 2 m above the rest."""
+    cut, island = cut_off(NOSE)
+    positions = cut.mesh.positions.copy()
+    positions[island] += [0.0, 2.0, 0.0]
+    moved = replace(cut, mesh=replace(cut.mesh, positions=positions))
+    alone = np.tile(1.0 * (np.arange(table().shape[1]) == joint("pelvis")), (len(positions), 1))
+    found = linted(weighted(alone, moved), (stray_weights,))
+    assert "W012.islands" not in {one.diagnostic.key for one in found}
+
+
 def test_figure_on_its_head_is_upside_down():
     """With y and z reversed, the head, 1.35 m above the ankles, is below them."""
     figure, turn = body(), np.diag([1.0, -1.0, -1.0, 1.0])

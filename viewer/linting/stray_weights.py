@@ -141,6 +141,8 @@ def misplaced_weights(subject: Subject) -> _Misplaced | None:
     stray &= ~np.isin(found.joints, swapped[:, 0]) & ~_are_adjacent(found, parents)
     for one in taken:
         stray[one.rows] = False
+    if len(np.unique(found.joints)) == 1:
+        stray[:] = False  # as of a mesh below a node: no other joint could move a part
     whole = stray & _are_islands(surface, found, parts) if stray.any() else stray
     strays, islands = np.flatnonzero(stray & ~whole), np.flatnonzero(whole)
     return _Misplaced(found, distances, strays, islands, taken, swapped)
