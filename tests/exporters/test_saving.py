@@ -420,11 +420,14 @@ def test_pose_matches_the_target_without_correctives(rigged):
 
 def test_skel_rig_matches_the_target_and_reports_losses(rigged, tmp_path):
     target, found = rigged
+    found = replace(found, figure=replace(found.figure, up="z", unit="cm"))
     lines = faults.lines(write_rigged(found, tmp_path / "arm.skel"))
     assert lines[-1].startswith("pose correctives are not stored: ")
     assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
-    files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
-    actor = viewer.load(*files).actors[0]
+    files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "obj", "json")]
+    (actor,) = viewer.load(*files).actors
+    # Only the .obj states them.
+    assert (actor.figure.up, actor.figure.unit) == ("z", "cm")
     # The text formats have six or more decimals.
     assert_allclose(deform(actor.figure, actor.pose)[0], target.positions, atol=1e-5)
 

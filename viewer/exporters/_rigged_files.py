@@ -90,7 +90,8 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     skel, _, obj, json = files
     with all_or_none(files):
         notes += export(Actor(figure, figure_pose(figure)), skel)
-        notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
+        mesh = Figure(figure.name, figure.mesh, up=figure.up, unit=figure.unit)
+        notes += export(Actor(mesh), obj)
         written, *lost = export(Actor(*_posed_skeleton(figure, rigged.pose)), json)
     message = "X001.target-pose: {n}, the target's pose"
     values = {"n": counted(written.values["n"], "DOF")}
