@@ -178,6 +178,29 @@ def test_limbs_of_wrong_lengths_do_not_spoil_a_fit_at_the_right_place(standing):
     assert posed_alignment._or_in_given_pose(job, found) is found
 
 
+@pytest.mark.parametrize(
+    ("gap", "bend", "is_better"),
+    [
+        (0.019, 0.2, True),  # closer and straighter
+        (0.019, 0.4, False),
+        (0.012, 0.4, True),  # much closer
+        (0.021, 0.2, False),
+    ],
+)
+def test_fit_in_the_given_pose_is_better_if_it_is_closer_and_straighter(
+    monkeypatch, gap, bend, is_better
+):
+    def fit(gap, bend):
+        return PosedAlignment(gap, None, None, None, (), bend=bend)
+
+    found, plain = fit(0.02, 0.3), fit(gap, bend)
+    monkeypatch.setattr(posed_alignment, "misfit", lambda alignment, is_part: alignment)
+    monkeypatch.setattr(posed_alignment, "_in_given_pose", lambda job, fit: fit)
+    monkeypatch.setattr(posed_alignment, "_fitted", lambda job, start: plain)
+    expected = plain if is_better else found
+    assert posed_alignment._or_in_given_pose(None, found) is expected
+
+
 def bent(angle):
     figure = arm()
     pose = rest_pose(figure.skeleton)

@@ -91,11 +91,6 @@ class Start:
     error: float
     """Root mean square distance of the marks from their positions, over the target's size."""
 
-    @property
-    def bend(self) -> float:
-        """Root mean square rotation of the joints, radians."""
-        return float(np.sqrt(np.mean(self.fitted.rotated**2)))
-
 
 def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody | None:
     """Return the anatomy of a posed template; None if it lacks two pairs of limbs."""

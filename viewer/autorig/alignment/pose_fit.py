@@ -93,6 +93,11 @@ class Fitted:
     grown: Floats
     """(3, J). Logarithms of the scales along the limbs, their sides and the third axes."""
 
+    @property
+    def bend(self) -> float:
+        """Root mean square rotation of the joints, radians."""
+        return float(np.sqrt(np.mean(self.rotated**2)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:

@@ -108,6 +108,8 @@ class PosedAlignment:
     """Messages about changes to pose and proportions, and about better options."""
     most_rotated: tuple[float, str] = (0.0, "")
     """The largest joint rotation in radians, and the joint's name; (0, "") if none."""
+    bend: float = 0.0
+    """Root mean square rotation of the joints, radians."""
     legs: tuple[LimbPair, ...] = ()
     """The target's legs from which it was fitted."""
     solids: tuple[Solid, Solid] | None = None
@@ -335,8 +337,8 @@ def _fits_of_limbs(job: _Job, starts: list[Start]) -> list[_LimbFit]:
     """Fit the starts that face the usual way, and the best one also facing the other way."""
     usual = [start for start in starts if start.is_sure or start.is_usual] or starts
     # To make arms of ears, trunk and legs must bend, too.
-    least = min((start.bend for start in usual), default=0.0)
-    usual = [start for start in usual if _STRAIGHTER * start.bend <= least]
+    least = min((start.fitted.bend for start in usual), default=0.0)
+    usual = [start for start in usual if _STRAIGHTER * start.fitted.bend <= least]
     found = []
     for number, start in enumerate(usual[:_MOST_STARTS]):
         with part_of_work(span=(0.4 + 0.2 * number, 0.6 + 0.2 * number)):
@@ -380,16 +382,18 @@ def _fitted_limbs(job: _Job, start: Start) -> PosedAlignment:
 
 
 def _or_in_given_pose(job: _Job, found: PosedAlignment) -> PosedAlignment:
-    """Return a poor fit, or one that begins at its place in the given pose if that is much closer.
+    """Return a poor fit, or a better one that begins at its place in the given pose.
 
-    Trousers, and hands that touch the thighs, hide where limbs begin. Wrong lengths mislead a fit,
-    but place and facing are right, and may be all that is needed.
+    Trousers, and hands that touch the thighs, hide where limbs begin, and so do arms of blocks that
+    are as thick as the trunk. Wrong lengths mislead a fit, but place and facing are right, and may
+    be all that is needed: the other fit is better if it is much closer, or closer and straighter.
     """
     gap = misfit(found.alignment, False)
     if gap <= _POOR:
         return found
     plain = _fitted(job, _in_given_pose(job, found))
-    return plain if misfit(plain.alignment, False) <= _KEPT * gap else found
+    kept = 1.0 if plain.bend <= found.bend else _KEPT
+    return plain if misfit(plain.alignment, False) <= kept * gap else found
 
 
 def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> PosedAlignment:
@@ -481,7 +485,7 @@ def _result(job: _Job, found: Fitted, how: AlignedBy) -> PosedAlignment:
     ours = Triangles(posed, job.template.require_mesh().triangles, job.settings.samples)
     alignment = Alignment.of(ours, job.exact, found.similarity, how)
     return PosedAlignment(
-        alignment, found.figure, found.pose, posed, _lines(found), _most_rotated(found)
+        alignment, found.figure, found.pose, posed, _lines(found), _most_rotated(found), found.bend
     )
 
 
