@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from viewer.autorig.anatomy import (
     Limb,
@@ -294,6 +295,29 @@ def test_quadruped_has_two_standing_pairs_in_both_orders():
     pairs = (front.lower, LimbPair(limbs), ears)
     assert plans_of(replace(anatomy, pairs=pairs), is_quadruped=False) == []
     assert len(plans_of(replace(anatomy, pairs=pairs[1:]), is_quadruped=False)) == 2
+
+
+@pytest.mark.parametrize("widens", [False, True])
+def test_trunk_of_an_elephant_is_no_neck(widens):
+    # The same chain with a head at its end is the neck of a grazing animal.
+    end = [[(0, 0.15, 1.1, 0.09)]] if widens else []
+    animal = mesh(
+        ball_chain((0, 0.8, -0.5, 0.2), (0, 0.8, 0.5, 0.2)),
+        ball_chain((0, 0.9, 0.6, 0.16), (0, 1.0, 0.8, 0.14)),
+        ball_chain((0, 1.0, 0.85, 0.06), (0, 0.8, 1.05, 0.05), (0, 0.15, 1.1, 0.04)),
+        *end,
+        *both((0.15, 0.6, -0.45, 0.08), (0.15, 0.06, -0.45, 0.06)),
+        *both((0.15, 0.6, 0.45, 0.08), (0.15, 0.06, 0.45, 0.06)),
+    )
+    anatomy = anatomy_of(*animal, UP, np.array([1.0, 0, 0]))
+    plan = plans_of(anatomy, is_quadruped=True, front=AHEAD)[0]
+    head = body_points(anatomy, plan, is_quadruped=True).positions[-8:-4]
+    assert np.isfinite(head).all()
+    if widens:
+        assert head[-1, 1] < 0.2
+    else:
+        # Its head is a ball of 0.14 at z = 0.8.
+        assert_allclose(head[-1], [0, 1.0, 0.87], atol=0.08)
 
 
 def test_ball_has_no_plan(monkeypatch):

@@ -81,6 +81,9 @@ _AS_LONG = 0.5  # length of arms relative to the longest limbs above the legs
 _MOST_ARMS = 2  # pairs that may be arms: ears of a rabbit are as long
 _LEANING = np.tan(np.radians(65.0))  # of a trunk that is upright: people bend, animals have 80
 _TAIL = 0.12  # shortest tail, as a fraction of the size
+# Length over mean radius of a trunk, and the part of the greatest radius on the way to its tip that
+# is thicker. The muzzle of a horse has 7; necks may have 20, but heads are wider, or not below.
+_SLENDER, _HALF = 10.0, 0.5
 _HEAD = (0.3, 0.95)  # part of the path from chest to top that contains the widest place of a head
 # Part of a leg's height to which a sole reaches, at which the shin is, and longest foot.
 _SOLE, _SHIN, _FOOT = 0.12, 0.3, 0.6
@@ -706,7 +709,7 @@ def _head_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
     if len(path) < 5:
         return np.full((4, 5), np.nan)
     if is_quadruped:
-        return _along(anatomy, path, (0.25, 0.5, 0.75, 1.0), 0.7)
+        return _along(anatomy, _without_trunk(anatomy, path), (0.25, 0.5, 0.75, 1.0), 0.7)
     points, radii = anatomy.solid.centers(anatomy.solid.voxels[path]), anatomy.paths.radii[path]
     fractions = arc_lengths(points)
     fractions = fractions / fractions[-1]
@@ -716,6 +719,23 @@ def _head_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
     rows = np.array([neck, (neck + head) // 2, head, len(path) - 1])
     # Hats and hair move the tip, but not the centre.
     return np.column_stack([points[rows], radii[rows], [0.7, 0.3, 1.0, 0.1]])
+
+
+def _without_trunk(anatomy: Anatomy, path: Ints) -> Ints:
+    """Return the path to the tip of an animal's head without the trunk of an elephant.
+
+    A trunk is slender, hangs down, and does not widen to a head.
+    """
+    points, radii = anatomy.solid.centers(anatomy.solid.voxels[path]), anatomy.paths.radii[path]
+    start = int(np.flatnonzero(radii >= _HALF * radii.max())[-1]) + 1
+    arc = arc_lengths(points[start:])
+    middle = start + int(np.searchsorted(arc, 0.5 * arc[-1])) if len(arc) > 1 else start
+    if middle == start or start < 2:
+        return path
+    fall = float((points[start] - points[-1]) @ anatomy.up)
+    is_slender = float(arc[-1]) >= _SLENDER * float(radii[start:].mean())
+    widens = float(radii[middle:].max()) > float(radii[start:middle].mean())
+    return path[:start] if is_slender and fall >= 0.5 * float(arc[-1]) and not widens else path
 
 
 def _tail_points(anatomy: Anatomy, ends: Ints, is_quadruped: bool) -> Floats:
