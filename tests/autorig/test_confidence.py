@@ -238,6 +238,23 @@ def test_trunk_is_upright_along_the_stated_up_axis(person):
     assert leaning(person, 0.0, up="z")["trunk"].rating == 0.0
 
 
+@pytest.mark.parametrize(
+    ("degrees", "is_right", "is_sure"),
+    [(15.0, True, True), (40.0, True, False), (90.0, False, False)],
+)
+def test_shoulders_that_are_turned_against_the_hips_are_doubtful(
+    person, degrees, is_right, is_sure
+):
+    figure, solid = person
+    turned = figure_pose(figure)
+    turned["spine1"] = [0.0, np.radians(degrees), 0.0]
+    pose = rest_pose(figure.skeleton)
+    found = judge(figure, pose, figure, turned, figure.mesh, alignment(0.02), (solid, solid))
+    (twist,) = (each for each in found if each.sentence.startswith("R017.twist:"))
+    assert twist.value == pytest.approx(degrees, abs=1.0)
+    assert (twist.rating >= 0.5) == is_right and (not list(remarks((twist,)))) == is_sure
+
+
 def test_person_who_bows_fits_closely(person):
     assert "trunk" not in leaning(person, 60.0, gap=0.009)
 

@@ -9,6 +9,7 @@ says little. A rig is right if the limbs of the template are where the target ha
 - the solid is as thick as that of the template: a picture cut out of cardboard is not;
 - the trunk is as upright as in the template, unless the surfaces agree closely: a bird with its
   wings for arms leans forward, a person whose rig is a fox's lies on the back;
+- shoulders and hips are as parallel as in the template: a bent limb may be taken for another one;
 - arms are not above a head that is hardly above the shoulders: they may be the ears of a rabbit;
 - nor are shoulders near the hips, far below the head: they may be the corners of a coat; nor beside
   the head: arms may be made of buns of hair;
@@ -83,6 +84,7 @@ _BEND = np.radians(40.0)  # rotation of every joint in the test pose
 _ALONG = np.linspace(0.1, 0.9, 9)  # places on a bone that are looked at
 _FOOT = 0.15  # part of a leg's path from its tip that is left out: toes may have no bones
 _LONG = 0.04  # shortest bone that counts, as a fraction of the template's size
+_LONG_BONE = 0.5  # length of the first long bone of a limb, relative to the longest one
 _BESIDE = 1.5  # distance from the nearest voxel's centre up to which a bone is inside, in voxels
 
 
@@ -359,6 +361,23 @@ def _posture(
             good=25.0,
         )
         found.append(leaning)
+    starts = [[_begin(parents, joints, joint) for joint in pair] for pair in trunk]
+    ways = [
+        [unit(places[left] - places[right]) for left, right in starts]
+        for places in (joints, rigged)
+    ]
+    twists = [float(np.degrees(np.arccos(np.clip(one @ other, -1.0, 1.0)))) for one, other in ways]
+    # Halfway: 50 degrees, a little more than people can twist. In 48 rigs that are right, it is at
+    # most 12; where a foot of a person who kneels misleads a hip, 41; where a shoulder of a runner
+    # is at the chest, 123.
+    twisted = Finding(
+        "R017.twist: the rig's shoulders and hips are rotated against each other by {value:.0f} "
+        "degrees more than in the template",
+        abs(twists[1] - twists[0]),
+        wrong=80.0,
+        good=20.0,
+    )
+    found.append(twisted)
     heights = joints @ axis_direction(template.up)
     legs, arms = sorted(trunk, key=lambda pair: float(heights[list(pair)].sum()))
     found += _limbs_inside(ours, theirs, template.require_skeleton(), trunk)
@@ -516,6 +535,16 @@ def _end(parents: Ints, joints: Floats, joint: int) -> int:
     """Return the joint of a limb that is farthest from its first one."""
     limb = np.flatnonzero(descendants(parents, joint))
     return int(limb[np.linalg.norm(joints[limb] - joints[joint], axis=1).argmax()])
+
+
+def _begin(parents: Ints, joints: Floats, first: int) -> int:
+    """Return the joint at which the first long bone of a limb begins: behind the collarbone."""
+    chain = [_end(parents, joints, first)]
+    while chain[-1] != first:
+        chain.append(int(parents[chain[-1]]))
+    lengths = np.linalg.norm(joints[chain[:-1]] - joints[chain[1:]], axis=1)
+    long = np.flatnonzero(lengths >= _LONG_BONE * lengths.max(initial=0.0))
+    return chain[int(long[-1]) + 1] if len(long) else first
 
 
 def _arm_length(parents: Ints, joints: Floats, first: int, end: int) -> float:
