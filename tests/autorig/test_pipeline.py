@@ -394,3 +394,42 @@ def test_joint_that_a_landmark_places_outside_the_target_is_reported():
         pairs[1, 1] = own[1] + [away, 0.0, 0.0]
         how = TransferSettings(alignment=AlignmentSettings(landmarks=pairs, samples=100))
         assert transfer(figure, rest, figure.mesh, how).outside == expected
+
+
+def test_mesh_with_z_up_gets_the_same_figure_and_a_placement():
+    figure, pose = bent_arm()
+    positions = deform(figure, pose)[0] + MOVE
+    # (x, y, z) with y up is (x, -z, y) with z up.
+    to_z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    place = np.eye(4)
+    place[:3, 3] = MOVE
+    turned = np.eye(4)
+    turned[:3, :3] = to_z
+    results = []
+    for up, matrix in (("y", place), ("z", turned @ place)):
+        target = mesh_of(positions @ matrix[:3, :3].T, figure.mesh.triangles)
+        how = TransferSettings(alignment=AlignmentSettings(matrix=matrix, up=up))
+        rigged = transfer(figure, pose, target, how, name="scan")
+        assert_allclose(again(rigged), target.positions, atol=1e-9)  # rounding
+        results.append(rigged)
+    standing, other = results
+    assert other.figure.up == "y"
+    assert_allclose(standing.placement, np.eye(4))
+    assert_allclose(other.placement, turned)
+    for chosen in (lambda rigged: rigged.pose, start_of_clips):
+        expected = deform(standing.figure, chosen(standing))[0]
+        assert_allclose(deform(other.figure, chosen(other))[0], expected, atol=1e-6)
+
+
+def test_figure_that_lies_in_its_mesh_is_reported():
+    figure, pose = bent_arm()
+    positions = deform(figure, pose)[0] @ np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]).T
+    marks = np.stack([deform(figure, pose)[0], positions], axis=1)[::7]
+    how = TransferSettings(alignment=AlignmentSettings(landmarks=marks))
+    rigged = transfer(figure, pose, mesh_of(positions, figure.mesh.triangles), how)
+    (said,) = [line for line in rigged.lines if line.key.startswith("R002.lying")]
+    assert said.values["up"] == "z"
+    assert_allclose(again(rigged), positions, atol=1e-6)
+    stated = TransferSettings(alignment=AlignmentSettings(landmarks=marks, up="z"))
+    rigged = transfer(figure, pose, mesh_of(positions, figure.mesh.triangles), stated)
+    assert not [line for line in rigged.lines if line.key.startswith("R002.lying")]

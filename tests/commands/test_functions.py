@@ -206,6 +206,13 @@ def test_rig_binds_a_mesh_to_a_skeleton(tmp_path):
     assert (weights[:16, 0] > 0.7).all() and (upper[20:] > 0.7).all()
     assert_allclose(scene[0].vertices()[0], tube, atol=1e-9)
     assert any("heat" in str(found) or "bone" in str(found) for found in scene.diagnostics)
+    lying = viewer.Actor(viewer.figure(tube[:, [0, 2, 1]] * (1, -1, 1), faces))
+    upright = viewer.rig(lying, skeleton=tmp_path / "bones.bvh", up="z")
+    # The file of the skeleton has y up, and so has the figure, also once it is written.
+    assert_allclose(upright[0].vertices()[0][:, 1], heights, atol=1e-9)
+    viewer.export(upright[0], tmp_path / "upright.glb")
+    written = viewer.load(tmp_path / "upright.glb")
+    assert_allclose(written[0].vertices()[0][:, 1].max(), 2.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from viewer.autorig.checks import (
 )
 from viewer.autorig.confidence import judge, refusal, remarks
 from viewer.autorig.correspondence import Template, with_reversed_winding
-from viewer.autorig.rigged import Rigged, as_found, with_fields
+from viewer.autorig.rigged import Rigged, as_found, standing, with_fields
 from viewer.autorig.seed import nearest
 from viewer.autorig.settings import BINDING, TransferSettings
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
@@ -84,7 +84,7 @@ def transfer(
     else:
         rigged = robust(figure, plain, target, how, name)
     report_fraction(1.0, "done")
-    return as_found(with_fields(rigged))
+    return standing(as_found(with_fields(rigged)), how.alignment.up)
 
 
 def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:

@@ -6,18 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.orientation_search import axis_rotations
-from viewer.autorig.alignment.surface_alignment import Alignment
+from viewer.autorig.alignment.orientation_search import (
+    axis_direction,
+    axis_rotations,
+    nearest_axis,
+)
+from viewer.autorig.alignment.surface_alignment import DEFAULT_UP, Alignment
 from viewer.autorig.confidence import Finding
 from viewer.autorig.transfer.rest_skeleton import rotate_roots
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
+from viewer.phrases import Remedy
 from viewer.rigs.annotations import VertexField
 from viewer.rigs.arrays import Bools, Floats, Ints
 from viewer.rigs.figure import Figure, figure_pose
 from viewer.rigs.joint_edits import at_rest
+from viewer.rigs.kinematics import world_matrices
 from viewer.rigs.motion.clip import Channel, Clip
 from viewer.rigs.motion.sampled_clip import SampledClip
 from viewer.rigs.pose import Pose, rest_pose
@@ -109,6 +115,50 @@ def as_found(rigged: Rigged) -> Rigged:
     rested = replace(figure, skeleton=at_rest(skeleton, rest))
     pose.translations[:] = 0.0
     return replace(rigged, figure=rested, pose=pose, template_rest=template)
+
+
+def standing(rigged: Rigged, up: str | None) -> Rigged:
+    """Return a copy whose pose stands along the figure's own up axis, as files show it.
+
+    The figure has the up axis of the template, which its clips need; ``placement`` then maps the
+    pose to the target, whose up axis is ``up``, or if None the usual one, should the figure stand
+    along it. A figure that lies in the target is left as it is.
+    """
+    found, pose = rigged.alignment, rigged.pose.copy()
+    figure = rigged.figure
+    if found is None or (up is None and found.how in ("given", "in place")):
+        return rigged
+    if up is None:
+        up = nearest_axis(found.similarity.rotation @ axis_direction(figure.up))
+        if up != DEFAULT_UP:
+            return replace(rigged, lines=(_lying(up), *rigged.lines))
+    if up == figure.up:
+        return rigged
+    rotation = axis_rotations(figure.up, up)[0]
+    back, skeleton = rotation.T, figure.require_skeleton()
+    # Roots at s p + t, with the figure's scale s and translation t, go to R^-1 (s p + t). The
+    # figure moves with the first one, the others relative to it.
+    roots = np.flatnonzero(skeleton.parents < 0)
+    origins = world_matrices(skeleton, pose)[roots, :3, 3]
+    wanted = (pose.figure_scale * origins + pose.figure_translation) @ rotation
+    skeleton, _ = rotate_roots(skeleton, pose, back)
+    pose.figure_translation = wanted[0] - pose.figure_scale * origins[0]
+    pose.translations[roots] += (wanted - pose.figure_translation) / pose.figure_scale - origins
+    placement = rigged.placement.copy()
+    placement[:3, :3] = placement[:3, :3] @ rotation
+    figure = replace(figure, skeleton=skeleton)
+    return replace(rigged, figure=figure, pose=pose, placement=placement)
+
+
+def _lying(up: str) -> Diagnostic:
+    """Return the warning that a figure does not stand along the up axis of its file."""
+    return note(
+        "R002.lying: the figure lies or is upside down, because {usual} is assumed to be the up "
+        "axis of the mesh; if {up} is, {remedy}",
+        usual=DEFAULT_UP,
+        up=up,
+        remedy=Remedy(f"choose Up: {up}", f"specify --up {up}"),
+    )
 
 
 def start_of_clips(rigged: Rigged) -> Pose:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.autorig.alignment.orientation_search import AXES
+from viewer.autorig.alignment.orientation_search import AXES, axis_direction, nearest_axis
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings, stated_up
 from viewer.autorig.checks import FARTHEST
 from viewer.autorig.correspondence import MatchSettings
@@ -62,6 +62,7 @@ from viewer.phrases import counted, listed, printable, rounded
 from viewer.progress import part_of_work
 from viewer.rigs.arrays import Floats
 from viewer.rigs.figure import Figure, figure_pose
+from viewer.rigs.geometry.vectors import Up
 from viewer.rigs.mesh import bounding_box
 from viewer.rigs.motion.clip import Clip, is_course_rig
 from viewer.rigs.motion.moving_mesh import (
@@ -230,7 +231,7 @@ def run(arguments: argparse.Namespace) -> int:
         from viewer.app.window import show
 
         result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
-        show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))
+        show(Scene([result, Actor(target, visible=False)], world_up=_world_up(rigged)))
     return 0
 
 
@@ -267,7 +268,8 @@ def rig(
     Returns
     -------
     Scene
-        The rigged figure, posed as the mesh was; the ``diagnostics`` say what was matched.
+        The rigged figure, posed as the mesh was; the ``diagnostics`` say what was matched. If the
+        mesh has another up axis than the template, the figure is upright along the template's.
 
     Raises
     ------
@@ -302,7 +304,15 @@ def rig(
         settings = _settings(arguments, actor, None, figure)
         rigged = _transferred(figure, actor, settings, found)
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
+    if _world_up(rigged) != rigged.figure.up:
+        result.placement = np.eye(4)
     return Scene([result], (*said.found, *rigged.lines), world_up=rigged.figure.up, files=inputs)
+
+
+def _world_up(rigged: Rigged) -> Up:
+    """Return the up axis of the target's space, in which the figure is placed upright."""
+    up = nearest_axis(rigged.placement[:3, :3] @ axis_direction(rigged.figure.up))
+    return "z" if up == "z" else "y"
 
 
 def _asked_template(
