@@ -151,6 +151,11 @@ def test_unknown_option_is_reported_first_with_the_nearest_name(arguments, unkno
     assert f"option {unknown}; did you mean {meant}" in said and "required" not in said
 
 
+def test_unknown_option_names_the_commands_that_have_it(capsys):
+    assert run(["lint", "wasp.skel", "--fix"]) == 2
+    assert "option --fix; it is an option of viewer convert (" in capsys.readouterr().err
+
+
 def test_unknown_short_options_are_refused_and_abbreviations_accepted(capsys, rig, tmp_path):
     assert run(["render", "-x"]) == 2
     assert "unknown option -x (" in capsys.readouterr().err

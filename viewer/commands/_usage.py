@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
 from viewer.errors import ViewerError
-from viewer.phrases import printable
+from viewer.phrases import all_of, printable
 from viewer.plugins import plugin_of, plugins_of
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ class Parser(argparse.ArgumentParser):
                     if action.choices is not None and name.lstrip("-") in action.choices
                 ]
             )
+            near = near or _elsewhere(name)
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> object:
@@ -104,6 +105,18 @@ class Parser(argparse.ArgumentParser):
         near = did_you_mean(str(value), choices)
         wrong = f'expected one of {", ".join(choices)}, found "{printable(value, _LONGEST)}"'
         raise argparse.ArgumentError(action, f"{wrong}; {near}" if near else wrong)
+
+
+def _elsewhere(option: str) -> str:
+    """Return which commands have an option that another one lacks; empty if none has."""
+    having = [
+        f"viewer {name}"
+        for name in COMMANDS
+        if option in command_parser(name)._option_string_actions
+    ]
+    if not having:
+        return ""
+    return f"it is an option of {all_of(having)}"
 
 
 def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
