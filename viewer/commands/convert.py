@@ -181,7 +181,7 @@ def _fixed(scene: Scene, text: str) -> list[Diagnostic]:
     if unknown:
         raise ViewerError(
             f"--fix: expected codes that can be fixed ({', '.join(sorted(FIXES))}), found "
-            f"{printable(unknown[0], 40)}"
+            f"{printable(unknown[0], 40)}; without codes, --fix fixes all it can"
         )
     with shown_progress("fixing"):
         found = fix_scene(scene, codes)
