@@ -551,8 +551,12 @@ def _limbs_at_rest(
         warn(
             "C018.limbs-unmatched: {names} of {figure} {stay} at rest: nothing in {motion} is "
             "recognised as {these} (unused: {unused}); match {them} in the Joint match "
-            "panel{remedy}",
+            "panel{remedy}"
+            if unused
+            else "C018.limbs-absent: {names} of {figure} {stay} at rest: {motion} has no such "
+            "{limbs}",
             **called,
+            limbs=agree(len(unmatched), "joint", "joints"),
             n=len(unmatched),
             names=listed(unmatched),
             unused=listed(unused),
