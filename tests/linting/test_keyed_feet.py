@@ -106,6 +106,38 @@ def test_modelled_character_that_stands_in_the_ground_throughout_is_found(depth)
     assert all(one.diagnostic.values["depth"] == "100 mm" for one in found)
 
 
+@pytest.mark.parametrize("height", [0.03, 0.1, 0.5])
+def test_modelled_character_that_hangs_in_the_air_throughout_is_found(height):
+    # Who is half a metre above the ground stands on something.
+    figure = viewer.load(bundled_body()).actors[0].figure
+    keys = np.tile(figure.skeleton.rest_translations[0] + [0.0, height, 0.0], (2, 1))
+    channel = TransformChannel(0, "translation", [0.0, 2.0], keys)
+    actor = Actor(figure, clip=TransformClip("keys", (channel,), 0.0, 2.0))
+    found = [one for one in check_feet(Subject(actor)) if one.severity == "warning"]
+    assert [one.diagnostic.key for one in found] == ["C016.throughout"] * (height == 0.1)
+    # The soles of its skin are 0.2 mm off the lowest point of its shape.
+    heights = [float(one.diagnostic.values["height"].removesuffix(" mm")) for one in found]
+    assert heights == pytest.approx([100.0] * len(found), abs=0.5)
+
+
+@pytest.mark.parametrize(("bend", "codes"), [(0.0, ["C016.throughout"]), (90.0, [])])
+def test_body_that_sits_does_not_hang_in_the_air(bend, codes):
+    # Level thighs and upright shanks lift the soles as far as the body is raised otherwise.
+    figure, half = viewer.load(bundled_body()).actors[0].figure, np.radians(0.5 * bend)
+    skeleton = figure.skeleton
+    hips, knees = ([skeleton.names.index(f"{side}_{part}") for side in ("left", "right")]
+                   for part in ("hip", "knee"))  # fmt: skip
+    thigh = -float(skeleton.rest_translations[knees[0], 1])
+    lift = 0.0 if bend else thigh
+    place = skeleton.rest_translations[0] + [0.0, lift, 0.0]
+    channels = [TransformChannel(0, "translation", [0.0, 2.0], np.tile(place, (2, 1)))]
+    for joints, sign in ((hips, -1.0), (knees, 1.0)):
+        turn = np.tile([sign * np.sin(half), 0.0, 0.0, np.cos(half)], (2, 1))
+        channels += [TransformChannel(joint, "rotation", [0.0, 2.0], turn) for joint in joints]
+    actor = Actor(figure, clip=TransformClip("keys", tuple(channels), 0.0, 2.0))
+    assert [one.diagnostic.key for one in check_feet(Subject(actor))] == codes
+
+
 @pytest.mark.parametrize(("depth", "key"), [(0.1, "C013.no-height"), (0.3, "C008.throughout")])
 def test_character_that_never_rests_is_in_the_ground_if_it_is_in_nearly_all_frames(depth, key):
     # It bobs by 0.1 m, so that its feet are up to 0.2 m below their lowest places, on no ground.

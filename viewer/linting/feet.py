@@ -48,6 +48,9 @@ _WITH_BODY = 0.1  # maximum difference of the velocities of foot and body, relat
 _ALONG_GROUND = 0.5  # the same along the ground, of feet that are slow: the body also sways
 _GLIDES = 0.08  # minimum distance, in sizes, of a foot that stands: feet of captures creep a little
 _DEEP = 0.08  # minimum depth of a foot that no roll reaches, as a fraction of the height
+# Minimum height of the hip above the heel, relative to the leg, of a body that stands: of one that
+# sits, it is about 0.6.
+_STRAIGHT = 0.75
 # Floors of whole motions, as fractions of the figure's height
 _BELOW = 0.03  # minimum depth at which a character stands in the ground: as for a guessed ground
 _LOW_FLOOR, _OTHER_FLOOR = 0.06, 0.25  # depths between which the floor of a capture is too low
@@ -106,6 +109,8 @@ def check(subject: Subject) -> Iterator[Finding]:
             return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
         yield from _sunk_throughout(subject, track, ground, height)
+        if n_feet == 2 and not found.is_guess:
+            yield from _floats_throughout(subject, track, ground, height)
     feet = _Feet(subject, track, heights - ground, height, _is_recorded(subject, track))
     yield from _sunk(feet, sinks * height)
     if n_feet == 2:  # animals also lie on the ground
@@ -208,6 +213,12 @@ def _stands_sunk(feet: _Feet, depths: Floats, limit: float) -> bool:
     return False
 
 
+def _rest_sole(subject: Subject, figure: Figure) -> float:
+    """Return the height of the soles at rest in the scene."""
+    row = subject.actor.placement["xyz".index(subject.up)]
+    return float(row["xyz".index(figure.up)] * extent(figure)[0] + row[3])
+
+
 def _sunk_throughout(
     subject: Subject, track: Track, ground: float, height: float
 ) -> Iterator[Finding]:
@@ -216,9 +227,7 @@ def _sunk_throughout(
     # capture may have any floor, and stand well below 0 if its root counts from the hip; a floor
     # a little below is a fault of its height.
     figure = track.stance
-    row = subject.actor.placement["xyz".index(subject.up)]
-    sole = float(row["xyz".index(figure.up)] * extent(figure)[0] + row[3])
-    size = track.scale * height
+    sole, size = _rest_sole(subject, figure), track.scale * height
     is_modelled = subject.actor.captured is None and figure.is_attached
     floor, least, most = (sole, _BELOW, np.inf) if is_modelled else (0.0, _LOW_FLOOR, _OTHER_FLOOR)
     depth = min(floor, 0.0) - ground
@@ -227,6 +236,33 @@ def _sunk_throughout(
     yield subject.found(
         "C008.throughout: feet are {depth} below the ground in the whole motion",
         depth=subject.length(depth / track.scale),
+        part="clip",
+        joints=track.feet,
+        frames=track.numbers[:1],
+        times=track.times[:1],
+        at=("frames", 0),
+    )
+
+
+def _floats_throughout(
+    subject: Subject, track: Track, ground: float, height: float
+) -> Iterator[Finding]:
+    """Report a modelled character whose feet rest above the floor in a whole motion."""
+    # The nearer of both floors, as above, is meant. Who sits has bent legs, and so do most climbers
+    # and riders; who swims has none below the body.
+    figure, size = track.stance, track.scale * height
+    if subject.actor.captured is not None or not figure.is_attached:
+        return
+    legs = np.stack([path.hip - path.heel for path in track.paths])[:, track.present]
+    reach = (legs @ axis_vector(subject.up)).max(axis=0)
+    if float(np.median(reach)) < _STRAIGHT * 0.5 * track.body:
+        return
+    above = min(ground - _rest_sole(subject, figure), ground, key=abs)
+    if not _BELOW * size < above < _OTHER_FLOOR * size:
+        return
+    yield subject.found(
+        "C016.throughout: feet are {height} above the ground in the whole motion",
+        height=subject.length(above / track.scale),
         part="clip",
         joints=track.feet,
         frames=track.numbers[:1],
