@@ -42,10 +42,10 @@ class Rigged:
     """The target, with its texture coordinates and materials; ``as_found`` puts it at rest in the
     pose of the target."""
     pose: Pose
-    """The pose that reproduces the target."""
+    """The pose that reproduces the target, once placed."""
     placement: Floats
     """(4, 4). Maps the posed figure to the target's frame; the identity unless the method changed
-    the target."""
+    the target, or the target has another up axis."""
     alignment: Alignment | None
     """Placement of the template; None for a method that only aligns boxes."""
     weights: WeightTransfer
