@@ -1,5 +1,7 @@
 """A bent arm as template, and its mesh, rotated and scaled by thirty, as target for rigging."""
 
+from dataclasses import replace
+
 import numpy as np
 from autorig.rigged_shapes import arm, mesh_of, turn
 
@@ -12,6 +14,7 @@ from viewer.rigs.skinning import deform
 SCALE, ROTATION, MOVE = 30.0, turn([0.1, 1, 0.2], 2.0), np.array([3.0, -4.0, 5.0])
 TRUE = np.eye(4)
 TRUE[:3, :3], TRUE[:3, 3] = SCALE * ROTATION, MOVE
+TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from y up to z up
 
 
 def bent():
@@ -38,10 +41,14 @@ def swing(figure) -> Clip:
     return Clip("swing", tuple(channels), 0.0, 1.0)
 
 
-def scene(with_template=True, with_clip=False) -> Scene:
-    """Return a scene of the mesh and the posed arm."""
+def scene(with_template=True, with_clip=False, up="y") -> Scene:
+    """Return a scene of the mesh, with an up axis, and the posed arm."""
     figure, pose = bent()
-    actors = [Actor(scan(figure, pose))]
+    target = scan(figure, pose)
+    if up == "z":
+        mesh = replace(target.mesh, positions=target.mesh.positions @ TO_Z[:3, :3].T)
+        target = replace(target, mesh=mesh, up="z")
+    actors = [Actor(target)]
     if with_template:
         clip = swing(figure) if with_clip else None
         actors.append(Actor(figure, pose.copy(), clip))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app import rig_scene
-from app.rig_scene import TRUE
+from app.rig_scene import TO_Z, TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.test_panel_pictures import _compare, _shown
 from app.tiny import write_rig
@@ -270,6 +270,22 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     hand.step(2)
     assert visible(hand) == ["scan rigged", "arm"]
     hand.assert_sane()
+
+
+def test_rig_of_a_mesh_with_z_up_stands_in_files(rigging, tmp_path):
+    hand = rigging(placed=False, up="z")
+    template, target = current_template(hand.state), hand.state.scene.actors[0].figure.mesh
+    move_by_hand(hand.state, template, as_similarity(TO_Z @ TRUE))
+    hand.step(2)
+    hand.click("Run")
+    hand.finish_job()
+    stop(hand)
+    assert_allclose(seen(hand, 0), target.positions, atol=1e-8)
+    # The template has y up, and so has the figure, also once it is written.
+    viewer.export(replace(hand.state.actor, clip=None, placement=np.eye(4)), tmp_path / "rig.glb")
+    written = viewer.load(tmp_path / "rig.glb")[0].vertices()[0]
+    upright = target.positions @ TO_Z[:3, :3]
+    assert_allclose(np.ptp(written, axis=0), np.ptp(upright, axis=0), atol=1e-4)
 
 
 def test_view_holds_the_whole_trial_motion_without_a_press_of_fit(rigging, monkeypatch):

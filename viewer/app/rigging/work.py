@@ -49,7 +49,7 @@ from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.curve_skeleton import find_skeleton
 from viewer.autorig.decomposition import DecompositionSettings
 from viewer.autorig.pipeline import transfer
-from viewer.autorig.rigged import Rigged
+from viewer.autorig.rigged import Rigged, standing
 from viewer.autorig.settings import SkeletonSettings, TransferMethod, TransferSettings
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import WeightSettings
@@ -437,6 +437,8 @@ def start_run(state: AppState, methods: tuple[TransferMethod, ...]) -> None:
             with part_of_work(f"{printable(name, 40)}, {method}", (low, high)):
                 rigged = transfer(aligned.figure, aligned.pose, mesh, settings, called)
             rigged = _with_known_method(rigged, found, own or template, mesh)
+            if found is not None:
+                rigged = standing(rigged, searched.up)
             rigged = replace(rigged, lines=(*template.lines, *rigged.lines))
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
