@@ -193,7 +193,8 @@ def test_surfaces_far_apart_are_a_doubt_with_its_number():
     # The plain thing first, then what to do, then the reasons.
     unlike = "this mesh is probably not a figure like the template, or not oriented as assumed; "
     why = refusal(found)
-    assert why.startswith(f"{unlike}use a template of the same kind (--from)")
+    kinds = "--from body for people, --from fox for four-legged animals"
+    assert why.startswith(f"{unlike}use a template of the same kind ({kinds}) or none (--auto), ")
     assert why.endswith("; reasons: template and mesh differ in shape by 6.0% of the size")
     # What helps if only the facing is wrong comes first.
     alike = note("R004.facing: front and back look alike, so if it is {back}, turn it", back="-z")

@@ -70,8 +70,9 @@ _SURE = 0.75  # confidence below which a rig may be wrong
 _FOUND: tuple[AlignedBy, ...] = ("search", "fit", "in place")  # by the program
 _UNLIKE = "this mesh is probably not a figure like the template, or not oriented as assumed"
 _REMEDY = (
-    "use a template of the same kind (--from) or none (--auto), specify --up, --facing or "
-    "--landmarks, or keep the rig if it is right (--keep-doubtful)"
+    "use a template of the same kind (--from body for people, --from fox for four-legged animals) "
+    "or none (--auto), specify --up, --facing or --landmarks, or keep the rig if it is right "
+    "(--keep-doubtful)"
 )
 # Misfits that are rated 0 and 1. Where limbs were found, hair, ears and armour of another shape may
 # be apart; where none were found, only a shape that agrees everywhere shows that they are there.
