@@ -127,7 +127,7 @@ def test_broken_archive_with_a_text_suffix_is_described(data, kind):
 def test_folder_of_other_files_is_refused(tmp_path):
     (tmp_path / "a.txt").write_text("hello")
     fault = refusal_of(lambda: detect(Source.open(tmp_path)))
-    assert fault == ("F002.unknown-folder", None, {})
+    assert fault == ("F002.unknown-folder", None, {"folder": str(tmp_path)})
 
 
 @pytest.mark.parametrize(
