@@ -138,6 +138,29 @@ def test_hand_that_touches_a_thigh_is_the_end_of_its_arm(touching):
     np.testing.assert_allclose([limb.points[-1][1] for limb in arms.limbs], 1.0, atol=0.1)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_forearm_of_a_hand_at_the_hip_belongs_to_its_arm(side):
+    arms = (
+        ball_chain((side * 0.1, 1.0, 0, 0.05), (side * 0.45, 0.82, 0, 0.05)),
+        ball_chain((side * 0.45, 0.82, 0, 0.05), (side * 0.14, 0.55, 0, 0.05)),
+        ball_chain((-side * 0.1, 1.0, 0, 0.05), (-side * 0.75, 1.0, 0, 0.05)),
+    )
+    parts = [
+        ball_chain((0, 0.65, 0, 0.12), (0, 1.0, 0, 0.12)),
+        ball_chain((0, 1.05, 0, 0.05), (0, 1.24, 0, 0.05)),
+        [(0, 1.24, 0, 0.12)],
+        *both((0.1, 0.6, 0, 0.06), (0.1, 0.04, 0, 0.05), (0.1, 0.04, 0.14, 0.04)),
+    ]
+    anatomy = anatomy_of(*mesh(*parts, *arms), UP, np.array([1.0, 0, 0]))
+    (plan,) = plans_of(anatomy, False, AHEAD)
+    points = body_points(anatomy, plan, is_quadruped=False).positions
+    # The straight arm is 0.8 long from the plane to its tip. The elbow is at 0.1 + 0.39 of that, so
+    # the first point, 5 % from the tip, is 0.27 along the forearm, whose direction is (-0.75, -0.66).
+    bent, straight = (16, 24) if side > 0.0 else (24, 16)
+    np.testing.assert_allclose(points[bent], [side * 0.25, 0.64, 0.0], atol=0.06)
+    np.testing.assert_allclose(points[straight], [-side * 0.76, 1.0, 0.0], atol=0.06)
+
+
 def test_ears_as_long_as_arms_are_another_pair():
     anatomy = anatomy_of(*person(0.3, ears=True), UP)
     plans = plans_of(anatomy, is_quadruped=False)

@@ -11,7 +11,8 @@ Found in the voxels of its solid, given only the up axis:
   the proportions; fingers and toes merge into one tip.
 - The tips of both sides are paired by length, place of attachment and mirrored position. Where a
   hand touches a thigh, either the hand or the elbow is the farthest place from the plane: if the
-  mirror image of the longer arm is inside the solid, it is the other arm.
+  mirror image of the longer arm is inside the solid, it is the other arm. With a hand at the hip,
+  the elbow is the farthest place, and another way leads from there to the trunk: the forearm.
 - A limb's axis is the path from its tip to the plane that prefers voxels far from the surface. Its
   junction with the trunk is where the radius exceeds the smallest one of the upper limb by half.
 - Legs that touch each other seem to part far below the crotch: they go on upwards as long as there
@@ -25,6 +26,7 @@ The points of the same anatomy in a template and in a target correspond to each 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,6 +61,11 @@ _BUMP = 1.6
 _PAIRED, _POSED = 0.3, 0.45
 _ARM_OF_ALL = 0.3  # length of an arm over that with what it holds, such as a staff
 _PROP = 0.2  # cost of what one limb of a pair holds, over its length
+# A limb that is a loop: what it lacks, as a fraction of its length to the farthest place; the part
+# of that length at which the loop shows two sides, outside the trunk and below fingers; thickness
+# of that section in voxels; part of what it lacks that its other side must have.
+_HIDDEN, _FORK, _RIM, _REACHES = 0.3, 0.7, 2.0, 0.75
+_BENT = 0.25  # part of the length from the elbow at which its radius is that of the limb
 _MOST_PAIRS = 4  # longest pairs that are considered
 
 _UPPER = (0.45, 0.95)  # part of a limb's path with the smallest radius of the upper limb
@@ -227,7 +234,8 @@ def _divided(
         for tip, path in zip(tips.tolist(), paths.to(middle, tips), strict=True)
     ]
     found = paired(limbs, sides[tips] > 0.0, lateral, offset, size, _POSED)[:_MOST_PAIRS]
-    pairs = tuple(_both_whole(solid, paths, pair, lateral, offset, size) for pair in found)
+    whole = [_both_whole(solid, paths, pair, lateral, offset, size) for pair in found]
+    pairs = tuple(_with_loop(solid, paths, pair, distances, middle) for pair in whole)
     report_fraction(1.0, "finding limbs")
     return Anatomy(solid, up, lateral, offset, symmetry, pairs, paths)
 
@@ -249,6 +257,54 @@ def _both_whole(
     centers = solid.centers(solid.voxels[rows])
     other = Limb(centers[:-1], paths.radii[rows[:-1]], centers[-1], longer.length)
     return LimbPair((longer, other) if longer is pair.limbs[0] else (other, longer))
+
+
+def _with_loop(
+    solid: Solid, paths: Paths, pair: LimbPair, distances: Floats, middle: Ints
+) -> LimbPair:
+    """Continue a limb whose end touches the body, as a hand at the hip, up to the length of both.
+
+    Arm and trunk are a loop then, and the elbow is farthest from the plane. What is held makes the
+    other limb longer, too, but the shorter one ends at its tip, without a second way to the trunk.
+
+    ``distances``: (N,), those of the voxels from the plane; ``middle``: the voxels in the plane.
+    """
+    from scipy.sparse import csgraph
+
+    arcs = [arc_lengths(limb.points) for limb in pair.limbs]
+    side = int(np.argmin([float(arc[-1]) for arc in arcs]))
+    limb, arc = pair.limbs[side], arcs[side]
+    missing = float(arcs[1 - side][-1] - arc[-1])
+    if missing < _HIDDEN * float(arc[-1]):
+        return pair
+    own = solid.nearest(limb.points)
+    least = _FORK * limb.length
+    rows = np.flatnonzero(distances >= least)
+    labels = csgraph.connected_components(paths.steps[rows][:, rows], directed=False)[1]
+    around = rows[labels == labels[int(np.searchsorted(rows, own[0]))]]
+    # Sections of both sides of the loop; a hand with fingers has only one.
+    rim = around[distances[around] < least + _RIM * solid.spacing]
+    labels = csgraph.connected_components(paths.steps[rim][:, rim], directed=False)[1]
+    mine = np.isin(labels, labels[np.isin(rim, own)])
+    if mine.all():
+        return pair
+    (way,) = paths.to(middle, own[:1], without=rim[mine])
+    beyond = solid.centers(solid.voxels[way])
+    lengths = arc_lengths(beyond)
+    if lengths[-1] < _REACHES * missing:
+        return pair
+    # At the elbow, both ways lead to the skin and back.
+    bent = float(limb.radii[int(np.searchsorted(arc, _BENT * arc[-1]))])
+    there, here = np.flatnonzero(lengths >= bent)[::-1], arc >= min(bent, arc[-1])
+    points = np.concatenate([beyond[there], limb.points[here]])
+    radii = np.concatenate([paths.radii[way[there]], limb.radii[here]])
+    reached = arc_lengths(points)
+    kept = reached >= reached[-1] - arcs[1 - side][-1]
+    points, radii = points[kept], radii[kept]
+    if np.linalg.norm(limb.points - points[0], axis=1).min() <= 2.0 * bent:
+        return pair  # the way is beside the limb
+    longer = replace(limb, points=points, radii=radii, length=pair.limbs[1 - side].length)
+    return LimbPair((longer, pair.limbs[1]) if side == 0 else (pair.limbs[0], longer))
 
 
 def sagittal_plane(

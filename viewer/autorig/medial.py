@@ -50,12 +50,20 @@ class Paths:
         self.n_cuts += 1
         return starts
 
-    def to(self, ends: Ints, starts: Ints) -> list[Ints]:
-        """Return the path from each start to the nearest of the ends, as rows of the solid."""
+    def to(self, ends: Ints, starts: Ints, without: Ints | None = None) -> list[Ints]:
+        """Return the path from each start to the nearest of the ends, as rows of the solid.
+
+        ``without``: rows that paths avoid; a path that has no other way is only its start.
+        """
         from scipy.sparse import csgraph
 
+        graph = self._graph
+        if without is not None:
+            avoided = np.zeros(len(self.radii), dtype=np.bool_)
+            avoided[without] = True
+            graph = _cut(graph, avoided, np.ones_like(avoided))[0]
         _, before, _ = csgraph.dijkstra(
-            self._graph, indices=ends, min_only=True, return_predecessors=True
+            graph, indices=ends, min_only=True, return_predecessors=True
         )
         found = []
         for start in starts.tolist():
