@@ -155,7 +155,7 @@ def test_forearm_of_a_hand_at_the_hip_belongs_to_its_arm(side):
     (plan,) = plans_of(anatomy, False, AHEAD)
     points = body_points(anatomy, plan, is_quadruped=False).positions
     # The straight arm is 0.8 long from the plane to its tip. The elbow is at 0.1 + 0.39 of that, so
-    # the first point, 5 % from the tip, is 0.27 along the forearm, whose direction is (-0.75, -0.66).
+    # the first point, 5 % from the tip, is 0.27 along the forearm, which leads (-0.75, -0.66).
     bent, straight = (16, 24) if side > 0.0 else (24, 16)
     np.testing.assert_allclose(points[bent], [side * 0.25, 0.64, 0.0], atol=0.06)
     np.testing.assert_allclose(points[straight], [-side * 0.76, 1.0, 0.0], atol=0.06)
