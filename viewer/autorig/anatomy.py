@@ -152,6 +152,11 @@ class Anatomy:
     """Medial paths in the solid."""
 
     @property
+    def is_symmetric(self) -> bool:
+        """Whether the figure is certainly its own mirror image, and stands like that."""
+        return self.symmetry >= _SYMMETRIC
+
+    @property
     def size(self) -> float:
         """Longest side of the solid's box."""
         extents = np.ptp(self.solid.voxels, axis=0)

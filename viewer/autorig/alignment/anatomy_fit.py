@@ -36,10 +36,12 @@ from viewer.data_classes import dataclass
 from viewer.progress import report_fraction
 from viewer.rigs.arrays import Floats, Ints
 from viewer.rigs.figure import Figure
+from viewer.rigs.geometry.rotation import nearest_rotations
 from viewer.rigs.inspection.front import clear_front
-from viewer.rigs.kinematics import skinning_matrices, world_matrices
+from viewer.rigs.kinematics import skinning_matrices, world_matrices, world_rotations
 from viewer.rigs.mesh import Mesh
-from viewer.rigs.pose import Pose, placement_matrix
+from viewer.rigs.pose import Pose, joint_rotations, placement_matrix, set_joint_rotations
+from viewer.rigs.retargeting.mirror import mirror_axis
 from viewer.rigs.scene import Actor, Scene
 from viewer.rigs.skin import owners, skin_from_entries, weight_sums
 from viewer.rigs.skinning import deform
@@ -105,6 +107,46 @@ def template_body(figure: Figure, pose: Pose, positions: Floats) -> TemplateBody
         return None
     points = body_points(anatomy, plans[0], is_quadruped)
     return TemplateBody(figure, pose, positions, anatomy, points, is_quadruped, left)
+
+
+def straightened(figure: Figure, pose: Pose) -> Pose:
+    """Return a pose whose joints above pairs bend in the mirror plane of the bind pose only.
+
+    They decide on which side limbs and ears are. All others, such as limbs and the tail, keep their
+    rotations relative to their parents.
+    """
+    _, skeleton, skin = figure.attached()
+    parents, partners = skeleton.parents, limbs_of(figure).partners
+    numbers = np.arange(skeleton.n_joints, dtype=np.int32)
+    carries = np.zeros(skeleton.n_joints, dtype=bool)
+    for joint in range(skeleton.n_joints - 1, 0, -1):
+        # Children come after their parents.
+        if parents[joint] >= 0:
+            carries[parents[joint]] |= partners[joint] != joint or carries[joint]
+    carries &= partners == numbers
+    local = joint_rotations(skeleton, pose)
+    posed = world_rotations(parents, local)
+    bind = np.asarray(np.linalg.inv(skin.inverse_bind), dtype=np.float64)
+    bound = nearest_rotations(bind[:, :3, :3])[0]
+    # A joint rotated by D since the bind pose, in the axes of its root's, is rotated by F D F in
+    # the mirrored pose, with the reflection F. The mean of both has no twist and no sideways bend.
+    flip = np.where(np.arange(3) == mirror_axis(figure), -1.0, 1.0)
+    turned, straight = posed @ np.swapaxes(bound, 1, 2), posed.copy()
+    roots = numbers.copy()
+    for joint in np.flatnonzero(parents >= 0).tolist():
+        parent = parents[joint]
+        roots[joint] = roots[parent]
+        if carries[joint]:
+            root = turned[roots[joint]]
+            own = root.T @ turned[joint]
+            mean = nearest_rotations(own + flip[:, None] * own * flip)[0]
+            straight[joint] = root @ mean @ bound[joint]
+        else:
+            straight[joint] = straight[parent] @ local[joint]
+        local[joint] = straight[parent].T @ straight[joint]
+    found = pose.copy()
+    set_joint_rotations(skeleton, found, numbers, local)
+    return found
 
 
 def left_of(figure: Figure, pose: Pose) -> Floats:

@@ -23,6 +23,7 @@ from viewer.autorig.alignment.anatomy_fit import (
     left_of,
     start_of_landmarks,
     starts_of,
+    straightened,
     template_body,
 )
 from viewer.autorig.alignment.axes_fit import fit_axes
@@ -258,12 +259,19 @@ def _starts(
     lateral = None if front is None else np.cross(up, front)
     with part_of_work(span=(0.15, 0.3)):
         targets = anatomies_of(theirs.positions, theirs.triangles, up, lateral)
+    solids = body.anatomy.solid, targets[0].solid
+    if targets[0].is_symmetric and not len(landmarks):
+        # Where the template turns its head, ears and muzzle would begin off their places, and a
+        # round head does not show its rotation. Landmarks are points of the given pose.
+        straight = straightened(job.template, job.pose)
+        if not np.allclose(straight.values, job.pose.values, atol=1e-3):
+            posed = deform(job.template, straight)[0]
+            body = template_body(job.template, straight, posed) or body
     found = []
     for number, target in enumerate(targets):
         span = (0.3 + 0.1 * number / len(targets), 0.3 + 0.1 * (number + 1) / len(targets))
         with part_of_work(span=span):
             found += starts_of(body, target, front, landmarks)
-    solids = body.anatomy.solid, targets[0].solid
     return sorted(found, key=lambda start: start.error), solids
 
 
