@@ -394,14 +394,16 @@ def _or_in_given_pose(job: _Job, found: PosedAlignment) -> PosedAlignment:
 
     Trousers, and hands that touch the thighs, hide where limbs begin, and so do arms of blocks that
     are as thick as the trunk. Wrong lengths mislead a fit, but place and facing are right, and may
-    be all that is needed: the other fit is better if it is much closer, or closer and straighter.
+    be all that is needed: the other fit is better if it is much closer, or if it is closer and so
+    much straighter that the product of both ratios is as small.
     """
     gap = misfit(found.alignment, False)
     if gap <= _POOR:
         return found
     plain = _fitted(job, _in_given_pose(job, found))
-    kept = 1.0 if plain.bend <= found.bend else _KEPT
-    return plain if misfit(plain.alignment, False) <= kept * gap else found
+    other = misfit(plain.alignment, False)
+    straighter = min(plain.bend, found.bend) / found.bend if found.bend else 1.0
+    return plain if other <= gap and other * straighter <= _KEPT * gap else found
 
 
 def _fitted_marks(job: _Job, marked: Figure, start: Fitted, marks: Marks) -> PosedAlignment:
