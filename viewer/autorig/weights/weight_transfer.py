@@ -13,7 +13,8 @@ Closest points on a template of another shape jump from limb to limb. A match at
 about 2d where on the limb a vertex is, so its weights diffuse that far over the surface
 (``_settled``). So do those of vertices whose neighbours are matched d farther away on the template
 in its own proportions: the shoulders of a person, squeezed into a figure with a large head, are in
-its chest. Near the template, weights are copied exactly.
+its chest. The part of d that is near, or that other proportions explain, does not count: a dress
+would diffuse otherwise, but not the legs beneath it. Near the template, weights are copied exactly.
 """
 
 from __future__ import annotations
@@ -128,9 +129,10 @@ def transferred_weights(
     inpainted = ~found.matched & has_match[target.islands]
     distances = found.points.distances / size
     distances = np.where(inpainted, np.maximum(distances, settings.match.max_distance), distances)
-    crowding = template.crowding(target, found.points, found.matched) / size
+    near = settings.match.near_distance
+    crowding = template.crowding(target, found.points, found.matched) / size - near
+    loose = ((distances > near) | (crowding > 0.0)) & has_match[target.islands]
     distances = np.maximum(distances, crowding)
-    loose = (distances > settings.match.near_distance) & has_match[target.islands]
     method = "direct"
     if loose.any():
         report_fraction(0.5, "measuring the surface")
