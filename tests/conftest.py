@@ -181,6 +181,16 @@ def rig(tmp_path: Path) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
+def forker():
+    """A process that forks the programs of a test file, which then need not import anything."""
+    from forked_programs import Forker
+
+    kept = Forker()
+    yield kept
+    kept.close()
+
+
+@pytest.fixture(scope="module")
 def opened():
     """Scenes by the options with which commands have opened them."""
     return {}

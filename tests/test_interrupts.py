@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 from app.tiny import write_rig
 from children import listening
-from forked_programs import Forker
 from PIL import Image
 
 from viewer.cli import run
@@ -87,13 +86,6 @@ keys 2 {
 0.2 %g linear linear
 }
 }"""
-
-
-@pytest.fixture(scope="module")
-def forker():
-    kept = Forker()
-    yield kept
-    kept.close()
 
 
 @pytest.fixture

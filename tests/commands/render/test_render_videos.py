@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from commands.drawn_motions import anim_text, frames, names, picture
-from forked_programs import VIEWER, Forker
+from forked_programs import VIEWER
 from PIL import Image
 
 import viewer
@@ -153,13 +153,6 @@ def test_existing_video_is_replaced_only_with_force(draw, walk, tmp_path, name):
     assert (tmp_path / name).read_bytes() == b"precious"
     draw(walk, name, "--force", size="16x16")
     assert len(frames(tmp_path / name)) == 31
-
-
-@pytest.fixture(scope="module")
-def forker():
-    kept = Forker()
-    yield kept
-    kept.close()
 
 
 @pytest.fixture
