@@ -21,6 +21,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.exporters.gltf.document import Document, named, text_of
+from viewer.formats.gltf.nodes import Z_TO_Y
 from viewer.rigs.arrays import Floats
 from viewer.rigs.constraints.evaluation import constrained
 from viewer.rigs.file_record import Json
@@ -30,9 +31,7 @@ from viewer.rigs.pose import Pose, joint_rotations, local_matrices
 from viewer.rigs.skeleton import Skeleton
 from viewer.rigs.units import METRES, UNIT_NAMES
 
-_HALF = float(np.sqrt(0.5))
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
-_Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
 _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
@@ -110,7 +109,7 @@ def _above(up: SignedUp, unit: str) -> Json:
     names, node = [], {}
     if up == "z":
         names.append("z up")
-        node["rotation"] = _Z_TO_Y
+        node["rotation"] = list(Z_TO_Y)
     if METRES.get(unit, 1.0) != 1.0:
         names.append(UNIT_NAMES[unit])
         node["scale"] = [METRES[unit]] * 3

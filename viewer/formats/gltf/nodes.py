@@ -51,8 +51,10 @@ _BINDING_LAST_ROW = 1e-4
 _ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
-_Z_TO_Y = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
+
+Z_TO_Y = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+"""Rotation of the nodes that convert figures with z up, a quaternion (x, y, z, w)."""
 
 
 def read_tree(document: Document) -> NodeTree:
@@ -267,7 +269,7 @@ def _conversion(tree: NodeTree, node: int) -> tuple[Up, str] | None:
     units = [unit for unit, name in UNIT_NAMES.items() if name in names] or ["m"]
     if len(names) != (up == "z") + (units[0] != "m"):
         return None
-    rotation = _Z_TO_Y if up == "z" else _NO_ROTATION
+    rotation = Z_TO_Y if up == "z" else _NO_ROTATION
     return (up, units[0]) if _does_only(tree, node, rotation, METRES[units[0]]) else None
 
 
