@@ -193,12 +193,16 @@ def _finding(subject: Subject, track: Track, pops: OffPath, message: str, size: 
     )
 
 
+def _held(values: Floats) -> Floats:
+    """Return values (F, N, C) with the first and the last ones held beyond the motion."""
+    return np.pad(values, ((_HELD, _HELD), (0, 0), (0, 0)), mode="edge")
+
+
 def _found(
     values: Floats, known: Bools, shapes: tuple[_Shape, ...], least: float
 ) -> OffPath | None:
     """Return what has one of the shapes in values (F, N, C), and exceeds a size."""
-    values = np.pad(values, ((_HELD, _HELD), (0, 0), (0, 0)), mode="edge")
-    known = np.pad(known, ((_HELD, _HELD), (0, 0)), mode="edge")
+    values, known = _held(values), np.pad(known, ((_HELD, _HELD), (0, 0)), mode="edge")
     orders = sorted({1, *(shape.order for shape in shapes)})
     differences = {order: np.diff(values, n=order, axis=0) for order in orders}
     ends = ((_AROUND + 1, _AROUND + _LONGEST), (0, 0))
@@ -285,8 +289,7 @@ def _alone(found: OffPath | None, values: Floats) -> OffPath | None:
     if found is None:
         return None
     # Half a third difference is the edge of a step: x = 0 0 1 1 has -2 = 1 - 3.
-    held = np.pad(values, ((_HELD, _HELD), (0, 0), (0, 0)), mode="edge")
-    edges = 0.5 * lengths_of(np.diff(held, n=3, axis=0))
+    edges = 0.5 * lengths_of(np.diff(_held(values), n=3, axis=0))
     firsts = np.array([int(frames[0]) for frames in found.frames])
     others = edges[firsts + _HELD - 2]
     others[np.arange(len(firsts)), found.columns] = 0.0
