@@ -72,9 +72,9 @@ class Source:
 
     ``is_folder``: whether it is a folder, which has no bytes. ``max_size``: largest size of a file
     in bytes, including those inside a folder or archive. ``options``: options that select among the
-    contents of a file, ``"rig"`` for Anny and ``"lod"`` (level of detail) for MHR, or state what
-    it does not, ``"up"`` and ``"unit"``. ``frame_faults``:
-    the first error in frames of a motion that become gaps, see ``_frame_gaps.py``.
+    contents of a file (``"rig"`` for Anny, ``"lod"``, the level of detail, for MHR) or replace what
+    the file lacks (``"up"``, ``"unit"``). ``frame_faults``: the first error in frames of a motion
+    that become gaps, see ``_frame_gaps.py``.
     """
 
     def __init__(
